@@ -7,6 +7,8 @@
 //! `clumsy drift SESSIONS [FIRST [FOLDER]]`: the gyro of every board drifts by 0.3 deg/s a minute. A session is wrong if it stores a misfit without a question, which
 //! these people decline, or a calibration that is judged good.
 //!
+//! `clumsy clock SESSIONS [FIRST [FOLDER]]`: the clock of every board errs by 0.5 to 4.5 %.
+//!
 //! A session passes if it ends in a calibration that is right. One that ends in another way says why; a wrong calibration is an error of the wizard.
 
 mod person;
@@ -22,6 +24,7 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use mimu::{Calibration, JudgementKind};
 use mimu_cli::called::{Refusal, wizard};
 use mimu_tests::stored_calibration::{errors, half_widths};
+use mimu_tests::text_board::{Random, TextBoard};
 use mimu_wizard::event::{Event, Question, SessionState, UserRequest, View};
 use mimu_wizard::relay::{Arrival, Stamped};
 use mimu_wizard::turn::go_on;
@@ -96,9 +99,10 @@ fn main() -> ExitCode {
         };
         return population::run(part, *units, *sessions, kept.as_deref());
     }
-    let (drift, arguments) = match &arguments[..] {
-        [what, rest @ ..] if what == "drift" => (DRIFT, rest),
-        all => (0.0, all),
+    let (fault, arguments): (fn(&mut TextBoard, u64), _) = match &arguments[..] {
+        [what, rest @ ..] if what == "drift" => (|board, _| board.drift = DRIFT, rest),
+        [what, rest @ ..] if what == "clock" => (wrong_clock, rest),
+        all => (|_, _| {}, all),
     };
     let kept = arguments.get(2).map(PathBuf::from);
     let numbers: Result<Vec<u64>, _> = arguments.iter().take(2).map(|a| a.parse()).collect();
@@ -111,13 +115,24 @@ fn main() -> ExitCode {
         .into_par_iter()
         .map(|seed| {
             let mut sensor = Sensor::of(seed);
-            sensor.board.drift = drift;
+            fault(&mut sensor.board, seed);
             let session = session(seed, sensor, kept.as_deref(), "");
             println!("{}", session.line());
             session
         })
         .collect();
     summary(&all)
+}
+
+/// The clock of a seed's board is fast or slow by 0.5 to 4.5 %.
+fn wrong_clock(board: &mut TextBoard, seed: u64) {
+    let share = 0.005 + 0.04 * Random::new(seed ^ 0xc10c).even();
+    let factor = if seed % 2 == 0 {
+        1.0 + share
+    } else {
+        1.0 - share
+    };
+    board.stamps_s /= factor;
 }
 
 impl Session {

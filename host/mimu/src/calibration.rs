@@ -39,8 +39,8 @@ use crate::triad::Covariance;
 use crate::warning::Warning;
 use mimu_recording::error::Result;
 use mimu_recording::{
-    Manifest, RawUnit, Reference, SensorSettings, UNNAMED, are_two_units, check_kind, parse_toml,
-    read_text,
+    ClockRate, Manifest, RawUnit, Reference, SensorSettings, UNNAMED, are_two_units, check_kind,
+    parse_toml, read_text,
 };
 
 /// Version of the layout of a calibration at one temperature.
@@ -132,9 +132,25 @@ pub struct Calibration {
     effects: Vec<FittedEffect>,
 }
 
-/// What the schema says of [`SensorSettings`].
+/// What the schema says of [`SensorSettings`] and of [`ClockRate`].
 #[cfg(feature = "schema")]
 mod sensors_schema {
+    /// Rate of a board's clock relative to the computer's.
+    #[derive(schemars::JsonSchema)]
+    #[schemars(deny_unknown_fields)]
+    #[expect(dead_code, reason = "for the schema only")]
+    pub struct Clock {
+        /// The ratio: above 1 the board's clock is fast.
+        factor: f64,
+        /// Half-width of its 95 % interval.
+        half_width: f64,
+        /// Time over which they were compared, s.
+        over_s: f64,
+        /// The clock that the calibration's time follows.
+        #[schemars(extend("enum" = ["board", "computer", "trusted"]))]
+        times: String,
+    }
+
     /// The sensors of a unit as they were set.
     #[derive(schemars::JsonSchema)]
     #[schemars(deny_unknown_fields)]
@@ -180,6 +196,10 @@ pub struct Origin {
     /// Local gravity, m/s²; a device does not store it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gravity_mps2: Option<f64>,
+    /// How fast the clock of the times runs, if it was compared with a better one; a device does not store it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "schema", schemars(with = "Option<sensors_schema::Clock>"))]
+    pub clock: Option<ClockRate>,
     /// Mean temperature of the dwells, °C, if known.
     #[serde(default)]
     pub temp_c: Option<f64>,

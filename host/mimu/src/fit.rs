@@ -253,14 +253,18 @@ fn fit_as_prepared(mut prepared: Prepared, options: Options) -> Result<Fit> {
             .warnings
             .extend(earth::in_intervals(&prepared, sensor));
     }
-    let by_gravity = prepared.manifest.reference != Reference::Table;
-    let accels = sensors.iter_mut().filter(|s| s.sensor == Sensor::Accel);
-    for accel in accels.filter(|_| by_gravity) {
-        if let Some((triad, influence)) =
-            reference_error::with_gravity(&accel.estimated.triad, &prepared)
-        {
-            accel.estimated.triad = triad;
-            accel.influences.push(influence);
+    for of in &mut sensors {
+        let triad = &of.estimated.triad;
+        let added = match (of.sensor, prepared.manifest.reference) {
+            (Sensor::Accel, Reference::Gravity | Reference::TurntableRate) => {
+                reference_error::with_gravity(triad, &prepared)
+            }
+            (Sensor::Gyro, Reference::Gravity) => reference_error::with_clock(triad, &prepared),
+            _ => None,
+        };
+        if let Some((triad, influence)) = added {
+            of.estimated.triad = triad;
+            of.influences.push(influence);
         }
     }
     let by_magnitude = |s: &&SensorFit| s.figure == Figure::GravityMagnitude;

@@ -27,7 +27,7 @@ use crate::signal::stillness::{DwellSearch, Steps};
 use crate::signal::unit_in_si;
 use crate::warning::Warning;
 use mimu_recording::error::{Argument, Error, Result};
-use mimu_recording::{Batch, Manifest, Recording, Reference, ReferenceError};
+use mimu_recording::{Batch, ClockRate, Manifest, Recording, Reference, ReferenceError};
 
 /// A recording, condensed, with its dwells and their noise.
 #[derive(Debug, Clone)]
@@ -72,12 +72,22 @@ impl Prepared {
     /// [`crate::signal::stillness::STILL_FACTOR`].
     ///
     /// Errors: those of a recording on disk; columns of different lengths; no samples.
-    pub fn of(manifest: Manifest, samples: &Batch, search: impl Into<DwellSearch>) -> Result<Self> {
+    pub fn of(
+        mut manifest: Manifest,
+        samples: &Batch,
+        search: impl Into<DwellSearch>,
+    ) -> Result<Self> {
         manifest.check("manifest in memory")?;
         if samples.is_empty() {
             let remedy = "give as many readings as times: t_s and raw have one row for each sample";
             return Err(Error::new("samples in memory", "there are none", remedy));
         }
+        let mut by_computer = None;
+        if let Some(factor) = manifest.by_computer() {
+            let samples = by_computer.insert(samples.clone());
+            samples.t_s.iter_mut().for_each(|t| *t /= factor);
+        }
+        let samples = by_computer.as_ref().unwrap_or(samples);
         let integrate = manifest.reference == Reference::Gravity;
         let condensed = Condensed::of(samples, manifest.sample_rate_hz, integrate)?;
         let place = manifest.device.clone();
@@ -133,6 +143,8 @@ impl Prepared {
         let at = manifest.latitude_deg;
         let gravity = at.and_then(|at| Warning::of_gravity(manifest.gravity_mps2, at));
         dwells.warnings.extend(gravity);
+        let trusted = manifest.clock.filter(ClockRate::is_doubtful);
+        dwells.warnings.extend(trusted.map(Warning::TrustedClock));
         let in_si = unit_in_si::at_rest(&dwells.list, &manifest);
         dwells
             .warnings

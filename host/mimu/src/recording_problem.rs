@@ -96,7 +96,7 @@ impl Seen {
                 fault: Some(Fault::Stuck(_)),
                 ..
             } => Self::HeldReadings,
-            Warning::RateOff { .. } => Self::Clock,
+            Warning::RateOff { .. } | Warning::TrustedClock(_) => Self::Clock,
             Warning::ImplausibleRate { .. } => Self::SampleRate,
             Warning::Gaps { .. } | Warning::TurnNotUsed { fault: None, .. } => Self::Gaps,
             Warning::Empty { .. }

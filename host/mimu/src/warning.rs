@@ -7,9 +7,9 @@ use words::{degrees, off, open};
 use std::fmt::Display;
 use std::mem::discriminant;
 
-use mimu_recording::RAW_COLUMNS;
 use mimu_recording::error::Error;
 use mimu_recording::health::Finding;
+use mimu_recording::{ClockRate, RAW_COLUMNS};
 use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
 
@@ -62,6 +62,9 @@ pub enum Warning {
         off_percent: f64,
         manifest_hz: f64,
     },
+    /// A clock that the user trusts although it does not agree with the computer's.
+    #[error("{}, and it was trusted: if the computer's is right, the gyro's scale factors err by that factor", .0.words())]
+    TrustedClock(ClockRate),
     /// Sample rate that no inertial unit has, Hz.
     #[error("{} Hz is not the sample rate of an inertial unit: are the times in ms or µs instead of s? All rates and the scale factors of the gyro would be wrong by the same factor", significant(*.rate_hz))]
     ImplausibleRate { rate_hz: f64 },

@@ -15,6 +15,7 @@ pub mod units;
 
 mod batch;
 mod cell;
+mod clock;
 mod columns;
 mod csv_file;
 mod csv_writer;
@@ -53,6 +54,7 @@ use without_parquet as parquet_file;
 use without_parquet as parquet_writer;
 
 pub use batch::Batch;
+pub use clock::{ClockRate, REFUSED_SHARE, REPORTED_SHARE, Times};
 pub use columns::{Column, Columns, RAW_COLUMNS, REFERENCE_COLUMNS};
 pub use growing::Growing;
 pub use import::{

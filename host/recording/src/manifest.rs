@@ -5,6 +5,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use super::clock::ClockRate;
 use super::recorded::{Recorded, SensorSettings};
 use super::reference_error::ReferenceError;
 use super::turntable::Turntable;
@@ -228,6 +229,9 @@ pub struct Manifest {
     /// The device from which it was recorded.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub recorded: Option<Recorded>,
+    /// How fast the clock of the times runs, if it was compared with a better one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub clock: Option<ClockRate>,
     /// Where readings saturate.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rails: Option<Rails>,
@@ -316,6 +320,7 @@ impl Manifest {
             dropped_steps: Vec::new(),
             imported_with: Vec::new(),
             recorded: None,
+            clock: None,
             rails: None,
             whole_turns: None,
             turntable: None,
@@ -391,6 +396,9 @@ impl Manifest {
         }
         if let Some(error) = &self.reference_error {
             error.check(&at("reference_error"))?;
+        }
+        if let Some(clock) = &self.clock {
+            clock.check(&at("clock"))?;
         }
         if let Some(whole) = &self.whole_turns {
             whole.check(&at("whole_turns"))?;

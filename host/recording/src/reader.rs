@@ -28,6 +28,8 @@ pub struct Recording {
     /// One sentence for each thing that was ignored.
     pub warnings: Vec<Warning>,
     source: Samples,
+    /// Ratio by which the times of the samples are divided: they are by a clock that is fast by this factor.
+    clock_factor: Option<f64>,
 }
 
 #[derive(Debug, Clone)]
@@ -68,7 +70,7 @@ impl Recording {
             };
             return Err(Error::new(directory.display(), problem, remedy));
         }
-        let manifest = Manifest::read(&manifest)?;
+        let mut manifest = Manifest::read(&manifest)?;
         if manifest.means {
             return Err(Error::new(
                 directory.display(),
@@ -121,7 +123,9 @@ impl Recording {
                 (parquet, layout.clone(), Samples::Parquet(file, layout))
             }
         };
+        let clock_factor = manifest.by_computer();
         Ok(Recording {
+            clock_factor,
             manifest,
             directory: directory.to_owned(),
             samples,
@@ -135,7 +139,7 @@ impl Recording {
     ///
     /// # Errors
     /// The manifest is invalid; there are no rows, or neither sensor.
-    pub fn in_memory(manifest: Manifest, samples: Arc<dyn InMemory>) -> Result<Recording> {
+    pub fn in_memory(mut manifest: Manifest, samples: Arc<dyn InMemory>) -> Result<Recording> {
         manifest.check("recording in memory")?;
         let place = PathBuf::from(&manifest.device);
         let columns = samples.columns();
@@ -149,6 +153,7 @@ impl Recording {
             return refuse("it has the readings of neither sensor", remedy);
         }
         Ok(Recording {
+            clock_factor: manifest.by_computer(),
             manifest,
             directory: place.clone(),
             samples: place,
@@ -156,6 +161,15 @@ impl Recording {
             warnings: Vec::new(),
             source: Samples::InMemory(samples),
         })
+    }
+
+    /// The same samples with the times as they are written, by the board's clock.
+    #[must_use]
+    pub fn with_written_times(self) -> Self {
+        Self {
+            clock_factor: None,
+            ..self
+        }
     }
 
     /// Number of rows, if it is known without reading; CSV does not contain it.
@@ -191,6 +205,18 @@ impl Recording {
         columns: &[Column],
         progress: impl Fn(f64),
     ) -> Result<Vec<Vec<f64>>> {
+        let mut all = self.written_columns(columns, progress)?;
+        if let Some(factor) = self.clock_factor {
+            let times = all.iter_mut().zip(columns);
+            let times = times.filter(|(_, column)| **column == Column::Time);
+            times
+                .flat_map(|(values, _)| values)
+                .for_each(|t| *t /= factor);
+        }
+        Ok(all)
+    }
+
+    fn written_columns(&self, columns: &[Column], progress: impl Fn(f64)) -> Result<Vec<Vec<f64>>> {
         match &self.source {
             Samples::Csv(_) => {}
             Samples::Parquet(file, _) => {
@@ -206,7 +232,7 @@ impl Recording {
             }
         }
         let mut all: Vec<Vec<f64>> = vec![Vec::new(); columns.len()];
-        self.for_each_batch(progress, |batch| {
+        self.in_written_pieces(CHUNK, SLICE, progress, |batch| {
             for (values, column) in all.iter_mut().zip(columns) {
                 match batch.values(*column) {
                     Some(more) => values.extend_from_slice(more),
@@ -220,6 +246,23 @@ impl Recording {
 
     /// [`Recording::for_each_batch`] with pieces of a chosen size: bytes of CSV, rows of Parquet.
     pub(super) fn in_pieces(
+        &self,
+        chunk: u64,
+        slice: usize,
+        progress: impl Fn(f64),
+        mut consume: impl FnMut(&Batch) -> Result<()>,
+    ) -> Result<ReadSummary> {
+        let Some(factor) = self.clock_factor else {
+            return self.in_written_pieces(chunk, slice, progress, consume);
+        };
+        self.in_written_pieces(chunk, slice, progress, |batch| {
+            let mut batch = batch.clone();
+            batch.t_s.iter_mut().for_each(|t| *t /= factor);
+            consume(&batch)
+        })
+    }
+
+    fn in_written_pieces(
         &self,
         chunk: u64,
         slice: usize,

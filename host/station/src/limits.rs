@@ -239,6 +239,13 @@ impl Limits {
         if let Some(population) = &self.population {
             all.extend(population.limits(scale, raw_unit)?);
         }
+        // On another side the unit is 90 degrees off, whatever the rows allow.
+        all.extend(self.up.as_ref().map(|up| OwnLimit {
+            name: Quantity::Tilt.name(None),
+            lower: None,
+            upper: Some(45.0),
+            source: format!("{}, up = {up:?}", self.place),
+        }));
         all.extend(self.rows.iter().map(|row| OwnLimit {
             name: row.name.clone(),
             lower: row.lower,

@@ -88,7 +88,7 @@ impl Rest {
             variance: [0, 1, 2, 3, 4, 5].map(variance),
             duration_s: dwell.duration_s,
         };
-        match rest.turned(dwell, &condensed, scale) {
+        match turned(dwell, &condensed, scale) {
             Some(angle) if samples.has(Sensor::Accel as usize) => Err(moved(format!(
                 ": it turned by {:.2} deg",
                 angle.to_degrees()
@@ -102,25 +102,32 @@ impl Rest {
         let from = sensor.channels().start;
         Vector3::from_fn(|axis, _| self.mean[from + axis])
     }
+}
 
-    /// The angle between the forces in the first and the last third, rad, if it is a turn.
-    fn turned(&self, dwell: &Dwell, condensed: &Condensed, scale: &Scale) -> Option<f64> {
-        let third = (dwell.blocks.len() / 3).max(1);
-        let force = |blocks: Range<usize>| {
-            let count = blocks.len() as f64;
-            let mean = |axis: usize| {
-                let blocks = condensed.blocks[blocks.clone()].iter();
-                blocks.map(|b| b.raw[3 + axis].mean).sum::<f64>() / count
-            };
-            scale.apply(Sensor::Accel, &Vector3::from_fn(|axis, _| mean(axis)))
+/// The angle between the forces in the first and the last third, rad, if it is a turn.
+fn turned(dwell: &Dwell, condensed: &Condensed, scale: &Scale) -> Option<f64> {
+    let third = (dwell.blocks.len() / 3).max(1);
+    let per_raw = scale.si_per_raw(Sensor::Accel);
+    // By how neighbours differ: a slow turn is in the noise of the whole rest, and would hide itself.
+    let blocks = &condensed.blocks[dwell.blocks.clone()];
+    let variance = (0..3).map(|axis| {
+        let steps = blocks
+            .windows(2)
+            .map(|b| b[1].raw[3 + axis].mean - b[0].raw[3 + axis].mean);
+        let squares: f64 = steps.map(|s| s * s).sum();
+        squares / (2.0 * (blocks.len() - 1).max(1) as f64) * per_raw[axis].powi(2)
+    });
+    let force = |blocks: Range<usize>| {
+        let count = blocks.len() as f64;
+        let mean = |axis: usize| {
+            let blocks = condensed.blocks[blocks.clone()].iter();
+            blocks.map(|b| b.raw[3 + axis].mean).sum::<f64>() / count
         };
-        let first = force(dwell.blocks.start..dwell.blocks.start + third);
-        let last = force(dwell.blocks.end - third..dwell.blocks.end);
-        let angle = first.angle(&last);
-        let per_raw = scale.si_per_raw(Sensor::Accel);
-        let variance = (0..3).map(|axis| self.variance[3 + axis] * per_raw[axis].powi(2));
-        // The difference of two thirds has six times the variance of the mean of all.
-        let sigma = (6.0 * variance.fold(0.0, f64::max)).sqrt() / first.norm();
-        (angle > LARGEST_TURN + TURN_SIGMAS * sigma).then_some(angle)
-    }
+        scale.apply(Sensor::Accel, &Vector3::from_fn(|axis, _| mean(axis)))
+    };
+    let first = force(dwell.blocks.start..dwell.blocks.start + third);
+    let last = force(dwell.blocks.end - third..dwell.blocks.end);
+    let angle = first.angle(&last);
+    let sigma = (2.0 * variance.fold(0.0, f64::max) / third as f64).sqrt() / first.norm();
+    (angle > LARGEST_TURN + TURN_SIGMAS * sigma).then_some(angle)
 }

@@ -76,6 +76,7 @@ impl ThermalFit {
                 reference: Some(first.reference),
                 raw_unit: first.raw_unit,
                 gravity_mps2: Some(first.gravity_mps2),
+                clock: None,
                 temp_c: None,
                 temp_range_c: Some(range_c),
             },

@@ -3,12 +3,13 @@
 use mimu::judge::errors::{self, ErrorFigures};
 use mimu::judge::input;
 use mimu::judgement::{Judgement, JudgementKind};
-use mimu::quantity::{Figure, Sensor, significant};
+use mimu::quantity::{AXES, Figure, Sensor, significant};
 use mimu::readable;
 use mimu::unseen::Test;
+use mimu_recording::RawUnit;
 
 use crate::fit::{FitVerdict, Judged, ThermalFit};
-use crate::judge::rms;
+use crate::judge::{DwellError, rms};
 use crate::warning::Warning;
 
 /// Errors of curves that usual biases leave, in noise floors: their wander reaches 3 to 4 in the means of half a minute.
@@ -68,12 +69,18 @@ impl ThermalFit {
         let biases_only = self.joint.curves[sensor]
             .as_ref()
             .is_some_and(|c| c.biases_only());
+        // Without scale factors biases stay in the unit of the readings.
+        let readable = match self.sessions[0].raw_unit {
+            RawUnit::Count if biases_only => (1.0, "count"),
+            RawUnit::Volt if biases_only => (1e3, "mV"),
+            _ => Figure::Input.readable(sensor),
+        };
         // Biases change between power-ons; no curve over temperature predicts that.
         let unseen = judged.without_session_bias.or(held_out);
         let error = unseen.unwrap_or(own);
         ErrorFigures {
             sensor,
-            figure: Figure::Input,
+            readable,
             error,
             unseen: unseen.is_some(),
             // Where only biases are estimated, the input is constant.
@@ -85,10 +92,23 @@ impl ThermalFit {
             test: noise_floor
                 .is_finite()
                 .then(|| Test::of_ratio(error / noise_floor, USUAL, judged.errors.len())),
-            cause: None,
+            cause: where_most(judged),
             too_few: None,
         }
     }
+}
+
+/// The axis that errs most, and the temperature of its largest error.
+fn where_most(judged: &Judged) -> Option<String> {
+    let errors = judged.held_out.as_ref().unwrap_or(&judged.errors);
+    let square = |axis: usize| errors.iter().map(|e| e.error[axis].powi(2)).sum::<f64>();
+    let axis = (0..3).max_by(|a, b| square(*a).total_cmp(&square(*b)))?;
+    let size = |e: &&DwellError| e.error[axis].abs();
+    let largest = errors.iter().max_by(|a, b| size(a).total_cmp(&size(b)))?;
+    Some(format!(
+        "most on {}, at {:.0} °C",
+        AXES[axis], largest.die_c
+    ))
 }
 
 /// Rate that errors of a gyro are compared with, rad/s: 100 deg/s, as in the errors that an export leaves.

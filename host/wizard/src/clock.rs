@@ -1,5 +1,7 @@
 //! Compares a board's clock with this computer's. Every rate of a gyro, and so its scale factor, errs by their ratio.
 
+use mimu_recording::{ClockRate, Times};
+
 /// Time over which the clocks are compared before a session begins, s.
 pub(crate) const COMPARED_S: f64 = 2.0;
 /// Fewest points of a comparison.
@@ -10,38 +12,8 @@ const POINT_S: f64 = 1.0;
 const REPORTED: usize = 10;
 /// Uncertainty of the delay of a line, s: bytes wait for a USB frame, for the operating system and for the next read.
 const DELAY_S: f64 = 0.02;
-/// Difference that is reported. Crystals keep 0.01 %, ceramic resonators 0.5 %; an oscillator on the chip keeps 1 to 2 %.
-pub const REPORTED_SHARE: f64 = 0.005;
-/// Difference from which on a session is refused: no oscillator errs by that much, but a period written in another unit, or a rounded one, does.
-pub const REFUSED_SHARE: f64 = 0.05;
-
-/// Rate of a board's clock relative to this computer's.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
-pub struct ClockRate {
-    /// The ratio: above 1 the board's clock is fast.
-    pub factor: f64,
-    /// Half-width of its 95 % interval.
-    pub half_width: f64,
-    /// Time over which they were compared, s.
-    pub over_s: f64,
-}
-
-impl ClockRate {
-    /// The least difference from 1 that is certain.
-    pub fn differs_by(&self) -> f64 {
-        ((self.factor - 1.0).abs() - self.half_width).max(0.0)
-    }
-
-    /// `its clock runs 1.031 ± 0.002 times as fast as this computer's, over 62 s`.
-    pub fn words(&self) -> String {
-        // Two digits of the half-width decide the digits of both.
-        let digits = (1.0 - self.half_width.log10().floor()).clamp(1.0, 7.0) as usize;
-        format!(
-            "its clock runs {:.digits$} ± {:.digits$} times as fast as this computer's, over {:.0} s",
-            self.factor, self.half_width, self.over_s
-        )
-    }
-}
+/// Uncertainty of the computer's own clock: its crystal keeps 50 ppm.
+const COMPUTER_SHARE: f64 = 5e-5;
 
 /// Times of lines by the board's clock and by the computer's, s.
 #[derive(Debug, Default)]
@@ -94,12 +66,13 @@ impl Clocks {
         let factor = quantile(slopes.collect(), 0.5)?;
         let off: Vec<f64> = of.iter().map(|p| p[0] - factor * p[1]).collect();
         let [low, high] = [0.16, 0.84].map(|share| quantile(off.clone(), share));
-        // As for a slope of n points that are spread evenly.
-        let sigma = (high? - low?) / 2.0 * (12.0 / of.len() as f64).sqrt();
+        // Delays of neighbours are alike: lines that arrive together shift an end by as much as they scatter, however many there are.
+        let compared = (high? - low?).max(DELAY_S) / over_s;
         Some(ClockRate {
             factor,
-            half_width: (1.96 * sigma).max(DELAY_S) / over_s,
+            half_width: compared.hypot(COMPUTER_SHARE),
             over_s,
+            times: Times::Board,
         })
     }
 }
@@ -113,6 +86,8 @@ fn quantile(mut of: Vec<f64>, share: f64) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
+    use mimu_recording::{REFUSED_SHARE, REPORTED_SHARE};
+
     use super::*;
 
     /// The rate found after `over_s` of a board with 100 lines a second, whose lines arrive up to 30 ms late and whose first second waited in a
@@ -162,8 +137,9 @@ mod tests {
             factor: 1.030_04,
             half_width: 0.000_21,
             over_s: 95.0,
+            times: Times::Board,
         };
-        let words = "its clock runs 1.03004 ± 0.00021 times as fast as this computer's, over 95 s";
+        let words = "the clock of its samples runs 1.03004 ± 0.00021 times as fast as the computer's, over 95 s";
         assert_eq!(rate.words(), words);
     }
 }

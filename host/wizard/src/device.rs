@@ -29,6 +29,8 @@ pub struct DeviceSource {
     /// Tick of the sample with number 0, and tick of the next sample.
     zero: i64,
     next: u64,
+    /// What has to be added to the crystal's time, ns.
+    zero_ns: i64,
     /// Whether the next sample begins a new count.
     anew: bool,
     /// Time since power-on at the start of sampling, s.
@@ -75,6 +77,7 @@ impl DeviceSource {
             heard: Instant::now(),
             zero: 0,
             next,
+            zero_ns: 0,
             anew: true,
         })
     }
@@ -82,6 +85,7 @@ impl DeviceSource {
     fn take(&mut self, samples: &Samples) -> Result<SourceEvent> {
         self.heard = Instant::now();
         let number = i64::from(samples.head.first);
+        let crystal_ns = 1000 * samples.head.tick_us as i64;
         // After a restart of the count the elapsed time is unknown. It is assumed to be so long that no turn is integrated across it.
         let back = self.zero + number < self.next as i64;
         if self.anew || back {
@@ -89,7 +93,9 @@ impl DeviceSource {
                 0 => 1,
                 _ => pause_periods(self.unit.rate_hz),
             };
-            self.zero = (self.next + pause) as i64 - number;
+            let tick = self.next + pause;
+            self.zero = tick as i64 - number;
+            self.zero_ns = (1e9 * tick as f64 / self.unit.rate_hz).round() as i64 - crystal_ns;
             self.anew = false;
         }
         let tick = (self.zero + number) as u64;
@@ -115,15 +121,17 @@ impl DeviceSource {
             temp_c: shortest(samples.head.temp_c),
             saturated: samples.head.flags & flags::SATURATED != 0,
             self_test: samples.head.flags & flags::SELF_TEST != 0,
-            power_on_s: self
-                .powered_for_s
-                .map(|s| self.zero as f64 / self.unit.rate_hz - s),
+            crystal_ns: Some([
+                (crystal_ns + self.zero_ns) as u64,
+                u64::from(samples.head.period_ns),
+            ]),
+            power_on_s: self.powered_for_s.map(|s| self.zero_ns as f64 / 1e9 - s),
         }))
     }
 }
 
 /// The sample rate by the board's crystal, Hz. A digital sensor has a clock of its own, whose rate the board knows to 0.1 % at its first sample and to
-/// 20 ppm some seconds later; the session counts its time with it.
+/// 20 ppm some seconds later.
 fn settled_rate_hz(session: &mut Session) -> Result<f64> {
     let raw_unit = session.who().raw_unit(session.port())?;
     let mut rate_hz = session.who().sample_rate_hz;

@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 use mimu::diagnose::Verdict;
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{
-    Batch, Columns, Growing, MANIFEST_FILE, Manifest, Recording, Restart, SampleFormat,
+    Batch, ClockRate, Columns, Growing, MANIFEST_FILE, Manifest, Recording, Restart, SampleFormat,
 };
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -362,9 +362,13 @@ impl OpenRecording {
             }
             Some((rows, bytes)) => {
                 // The power-on time was stored at the beginning. The recording's clock has continued since, whatever the device did.
-                manifest.power_on_s = Manifest::read(&directory.join(MANIFEST_FILE))?.power_on_s;
+                let written = Manifest::read(&directory.join(MANIFEST_FILE))?;
+                manifest.power_on_s = written.power_on_s;
+                let clocks = manifest.clock.into_iter().chain(written.clock);
+                manifest.clock = clocks.min_by(|a, b| a.half_width.total_cmp(&b.half_width));
                 let growing = Growing::resume(&directory, columns, rows, bytes)?;
-                Recording::open(&directory)?.for_each_batch(
+                let recording = Recording::open(&directory)?.with_written_times();
+                recording.for_each_batch(
                     |_| {},
                     |batch| {
                         append(&mut samples, batch);
@@ -421,6 +425,12 @@ impl OpenRecording {
         if let Some(recorded) = &mut self.manifest.recorded {
             recorded.restarts.push(Restart { t_s, start });
         }
+    }
+
+    /// Records how fast the clock of its times runs. Whoever reads it corrects them: on disk they stay as they came, so that a comparison over a longer time
+    /// improves all of them.
+    pub fn set_clock(&mut self, clock: ClockRate) {
+        self.manifest.clock = Some(clock);
     }
 
     /// The manifest.

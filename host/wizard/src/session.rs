@@ -9,12 +9,12 @@ use mimu::prepared::Prepared;
 use mimu::prior::Prior;
 use mimu::quantity::Sensor;
 use mimu::result::diagnosis::DiagnosisResult;
+use mimu_recording::ClockRate;
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::result_file::stage;
 use serde::Serialize;
 
 use crate::axes;
-use crate::clock::ClockRate;
 use crate::event::{Event, Phase, Question, View};
 use crate::folder::{Begun, Entry, Folder, Part};
 use crate::procedure::{Fixture, SessionConfig};

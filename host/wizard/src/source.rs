@@ -3,9 +3,7 @@
 use mimu_core::compensation::Affine;
 use mimu_device::Session;
 use mimu_recording::error::Result;
-use mimu_recording::{RawUnit, SensorSettings};
-
-use crate::clock::ClockRate;
+use mimu_recording::{ClockRate, RawUnit, SensorSettings};
 
 /// The unit at a port.
 #[derive(Debug, Clone)]
@@ -43,8 +41,23 @@ pub struct Chunk {
     pub saturated: bool,
     /// Whether a self-test deflected the sensors.
     pub self_test: bool,
-    /// Time of the power-on by the clock of the ticks, s; `None` if unknown.
+    /// Time of the first sample and time between samples, ns, by a better clock than the one that takes them: an oscillator on a sensor's chip warms and
+    /// drifts by 0.1 %. `None`: a period of the nominal rate per tick.
+    pub crystal_ns: Option<[u64; 2]>,
+    /// Time of the power-on by the clock of the times, s; `None` if unknown.
     pub power_on_s: Option<f64>,
+}
+
+impl Chunk {
+    /// Time of each sample, s, at this nominal rate.
+    pub fn times(&self, rate_hz: f64) -> impl Iterator<Item = f64> {
+        let (tick, crystal_ns) = (self.tick, self.crystal_ns);
+        (0..self.values.len() as u64).map(move |k| match crystal_ns {
+            // In whole ns, so that samples that are milliseconds apart get the nearest number.
+            Some([first, period]) => (first + k * period) as f64 / 1e9,
+            None => (tick + k) as f64 / rate_hz,
+        })
+    }
 }
 
 /// An event of a source.
@@ -56,7 +69,7 @@ pub enum SourceEvent {
     Restarted(String),
     /// Information for the user.
     Note(String),
-    /// The board's clock, compared with this computer's once more.
+    /// The clock of the samples, compared with this computer's once more.
     Clock(ClockRate),
     /// Nothing came for a short while.
     Nothing,

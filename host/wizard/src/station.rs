@@ -6,9 +6,9 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use mimu_device::Session;
+use mimu_recording::ClockRate;
 use mimu_recording::error::{Argument, Error, Result};
 
-use crate::clock::ClockRate;
 use crate::source::{Chunk, Opener, Source, SourceEvent, Unit};
 
 /// Interval between attempts to reopen a port.

@@ -5,11 +5,11 @@ use std::collections::VecDeque;
 
 use mimu::signal::increment::pause_periods;
 use mimu_core::compensation::Affine;
-use mimu_recording::RawUnit;
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::health::{StreamRails, Unanswered};
+use mimu_recording::{ClockRate, REFUSED_SHARE, RawUnit, Times};
 
-use crate::clock::{ClockRate, Clocks, REFUSED_SHARE};
+use crate::clock::Clocks;
 use crate::regular::{Regular, Timed};
 use crate::source::{Chunk, SourceEvent, Unit};
 use crate::text_line::{Columns, Lines, Reading};
@@ -53,7 +53,7 @@ pub struct TextBoard {
     heard_s: f64,
     /// Refused lines whose time is impossible.
     garbled: u64,
-    /// The board's clock and the computer's.
+    /// The clock of the samples and the computer's.
     clocks: Clocks,
     clock_trusted: bool,
     rails: StreamRails,
@@ -211,9 +211,8 @@ impl TextBoard {
         for reading in self.lines.take(bytes) {
             self.heard_s = now_s;
             let Reading { raw, temp_c, t_s } = reading;
-            let compared = t_s.and_then(|t_s| self.clocks.take(t_s, now_s));
-            if let Some(rate) = compared.filter(|_| !self.clock_trusted) {
-                self.ready.push_back(SourceEvent::Clock(rate));
+            if let Some(t_s) = t_s {
+                self.compare_clocks(t_s, now_s);
             }
             let timed = Timed {
                 t_s: t_s.unwrap_or(now_s),
@@ -239,9 +238,23 @@ impl TextBoard {
         }
     }
 
+    /// Compares a time by the clock of the samples with the computer's.
+    fn compare_clocks(&mut self, t_s: f64, now_s: f64) {
+        if let Some(mut rate) = self.clocks.take(t_s, now_s) {
+            if self.clock_trusted {
+                rate.times = Times::Trusted;
+            }
+            self.ready.push_back(SourceEvent::Clock(rate));
+        }
+    }
+
     /// Appends a sample to the current chunk, unless the board only repeats its last readings.
     fn emit(&mut self, tick: u64, sample: &Timed) {
         let rate_hz = self.unit.rate_hz;
+        if !self.lines.has_clock() {
+            // Without a clock the lines are counted, at the rate of the first seconds.
+            self.compare_clocks(tick as f64 / rate_hz, sample.t_s);
+        }
         let (raw, pause) = (&sample.raw, pause_periods(rate_hz));
         if self.unanswered.take(raw, rate_hz, pause) {
             return;
@@ -262,6 +275,7 @@ impl TextBoard {
                 temp_c: sample.temp_c,
                 saturated,
                 self_test: false,
+                crystal_ns: None,
                 power_on_s: None,
             })),
         }
@@ -301,7 +315,7 @@ impl TextBoard {
 
 /// Error if the clock of the board at `port` is certainly wrong.
 pub(crate) fn refuse_clock(port: &str, rate: &ClockRate) -> Result<()> {
-    if rate.differs_by() <= REFUSED_SHARE {
+    if rate.differs_by() <= REFUSED_SHARE || rate.times == Times::Trusted {
         return Ok(());
     }
     let problem = format!(

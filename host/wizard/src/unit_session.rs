@@ -11,17 +11,16 @@ use mimu::signal::stillness::GUARD_S;
 use mimu::triad::Triad;
 use mimu_core::compensation::Affine;
 use mimu_recording::error::{Argument, Error, Result};
-use mimu_recording::{Batch, Columns, Manifest, Recorded};
+use mimu_recording::{ClockRate, Columns, Manifest, REPORTED_SHARE, Recorded};
 use nalgebra::Vector3;
 
 use self::conditions::{Tilts, Turns, motion_limits, rate_limit_dps};
-use self::rows::{cut, known, shorten};
+use self::rows::{Pending, known};
 use self::spins::Spinning;
 use crate::axes;
 use crate::bank::DeviceBanks;
-use crate::clock::{ClockRate, REPORTED_SHARE};
 use crate::event::{Event, UnitState};
-use crate::folder::{Entry, Folder, OpenRecording, Part, append};
+use crate::folder::{Entry, Folder, OpenRecording, Part};
 use crate::procedure::{Fixture, SessionConfig};
 use crate::refit::{Parameter, Progress, calibrate, progress};
 use crate::source::Chunk;
@@ -45,6 +44,9 @@ const KNOWN: f64 = 20.0;
 
 /// Largest half-width of the axes' angles with which axes of gyro and accelerometer can be compared, µrad (6 degrees).
 const AXES_KNOWN: f64 = 1e5;
+
+/// Angle from the last pose, degrees, from which on the unit was turned away: in motion an accelerometer errs by some degrees.
+const AWAY_DEG: f64 = 30.0;
 
 /// If this many consecutive fits are refused for another reason than too few dwells, the session cannot succeed.
 const REFUSED: u32 = 4;
@@ -107,13 +109,17 @@ pub struct UnitSession {
     spin: Option<Spinning>,
     /// Turns by the gyro and by the accelerometer, for their units.
     tilts: Tilts,
-    pending: Batch,
+    pending: Pending,
     next: Option<u64>,
+    /// Cause of a restart after which no sample has come yet.
+    restarted: Option<String>,
     /// Time of power-on by the clock of the recordings, s.
     power_on_s: Option<f64>,
     dwell: Option<Dwell>,
     /// Whether it was turned since the dwell was requested.
     moved: bool,
+    /// Whether it was turned away from the last pose.
+    away: bool,
     /// Why the dwells so far cannot give a calibration.
     hopeless: Option<Error>,
     /// Missing samples since the last dwell, and statistics of the turns so far.
@@ -121,7 +127,7 @@ pub struct UnitSession {
     turns: Turns,
     /// Samples at a rail since the last dwell.
     turn_clipped: u64,
-    /// The board's clock by the last comparison with this computer's.
+    /// The clock of the samples by the best comparison with this computer's.
     pub clock: Option<ClockRate>,
     /// Consecutive refused fits for another reason than too few dwells.
     refused: u32,
@@ -153,11 +159,13 @@ impl UnitSession {
             recording: None,
             progress: Progress::default(),
             done: false,
-            pending: Batch::default(),
+            pending: Pending::default(),
             next: None,
+            restarted: None,
             power_on_s: None,
             dwell: None,
             moved: false,
+            away: false,
             hopeless: None,
             turn_missing: 0,
             turn_clipped: 0,
@@ -202,8 +210,11 @@ impl UnitSession {
                 ..Recorded::default()
             });
         }
+        manifest.clock = self.clock;
         self.part = part;
         self.recording = Some(OpenRecording::begin(&self.folder, part, columns, manifest)?);
+        let compared = self.recording.as_ref().and_then(|r| r.manifest().clock);
+        self.clock = compared.or(self.clock);
         // Discarded dwells keep their numbers.
         let had = self.folder.entries().iter().filter_map(|e| match e {
             Entry::Dwell {
@@ -220,7 +231,8 @@ impl UnitSession {
         });
         // Waiting events are from before this recording.
         while self.station.news()?.is_some() {}
-        (self.pending, self.dwell, self.next) = (Batch::default(), None, None);
+        self.pending.clear();
+        (self.dwell, self.next) = (None, None);
         self.watch.interrupted();
         self.watch.begin();
         Ok(())
@@ -260,10 +272,7 @@ impl UnitSession {
                     }
                 }
                 StationEvent::Restarted(why) => {
-                    let next = self.next.unwrap_or(0) as f64 / self.station.unit.rate_hz;
-                    if let Some(recording) = &mut self.recording {
-                        recording.restarted(next, why.clone());
-                    }
+                    self.restarted = Some(why.clone());
                     self.interrupted(Interruption::Restarted(why), tell)?;
                     if let Some(banks) = &mut self.banks {
                         banks.mark_incomplete(
@@ -295,16 +304,19 @@ impl UnitSession {
     /// Errors: the clock is wrong.
     fn compare_clock(&mut self, rate: ClockRate, tell: &mut Vec<Event>) -> Result<()> {
         refuse_clock(&self.name(), &rate)?;
+        // A comparison that began anew after an interruption is wider than the one before.
+        if self.clock.is_some_and(|c| c.half_width < rate.half_width) {
+            return Ok(());
+        }
         let reported = self.clock.is_some_and(|c| c.differs_by() > REPORTED_SHARE);
         if rate.differs_by() > REPORTED_SHARE && !reported {
-            let words = format!(
-                "{}: {}: the gyro's scale factors will err by that factor; check what the board writes as its time",
-                self.name(),
-                rate.words()
-            );
+            let words = format!("{}: {}", self.name(), rate.described());
             tell.push(Event::Note { words });
         }
         self.clock = Some(rate);
+        if let Some(recording) = &mut self.recording {
+            recording.set_clock(rate);
+        }
         Ok(())
     }
 
@@ -345,16 +357,13 @@ impl UnitSession {
             recording.missing(missing);
         }
         self.state.samples += chunk.values.len() as u64;
-        let rate_hz = self.station.unit.rate_hz;
-        let rows = &mut self.pending;
-        for (tick, row) in (chunk.tick..).zip(&chunk.values) {
-            rows.t_s.push(tick as f64 / rate_hz);
-            rows.step.push(-1);
-            rows.temp_c.push(chunk.temp_c);
-            for c in 0..6 {
-                rows.raw[c].push(row[c]);
-                rows.reference[c].push(f64::NAN);
-            }
+        self.pending.add(chunk, rate_hz);
+        let first = self.pending.rows.len() - chunk.values.len();
+        if let (Some(recording), Some(t_s)) =
+            (&mut self.recording, self.pending.rows.t_s.get(first))
+            && let Some(why) = self.restarted.take()
+        {
+            recording.restarted(*t_s, why);
         }
         // A turn does not take minutes: a longer pause becomes a gap.
         let kept_s = if self.spin.is_some() {
@@ -362,8 +371,9 @@ impl UnitSession {
         } else {
             KEPT_S
         };
-        if self.dwell.is_none() && rows.len() as f64 > 2.0 * kept_s * rate_hz {
-            cut(rows, rows.len() - (kept_s * rate_hz) as usize);
+        let had = self.pending.rows.len();
+        if self.dwell.is_none() && had as f64 > 2.0 * kept_s * rate_hz {
+            self.pending.cut(had - (kept_s * rate_hz) as usize);
         }
     }
 
@@ -382,6 +392,8 @@ impl UnitSession {
         state.trend_c_per_min = seen.trend;
         state.up = Some(up.normalize().into()).filter(|up: &[f64; 3]| up[0].is_finite());
         state.tilt_deg = step.map(|s| up.angle(&s.up()).to_degrees());
+        let last = self.folder.last_dwell();
+        self.away |= last.is_some_and(|s| up.angle(&s.up()).to_degrees() > AWAY_DEG);
         // An estimated gyro model has no scale.
         let rate = self.rate(seen);
         self.state.rate_dps = rate.map(|rate| rate.dot(&up.normalize()).to_degrees());
@@ -451,10 +463,7 @@ impl UnitSession {
             (Ok(step), None) => {
                 let from = seen.tick.saturating_sub((BEFORE_S * rate_hz) as u64);
                 self.begin_banks(&step, config);
-                let had = self.pending.t_s.iter().rev();
-                let had = had
-                    .take_while(|t| (**t * rate_hz).round() >= from as f64)
-                    .count() as u64;
+                let had = (self.pending.rows.len() - self.pending.before(from)) as u64;
                 self.dwell = Some(Dwell {
                     step,
                     from,
@@ -525,7 +534,6 @@ impl UnitSession {
         tell: &mut Vec<Event>,
     ) -> Result<()> {
         let config = round.config;
-        let rate_hz = self.station.unit.rate_hz;
         self.check_temperature(seen, config)?;
         if let Some(banks) = &mut self.banks {
             banks.keep(&self.station);
@@ -533,17 +541,9 @@ impl UnitSession {
         let Some(recording) = &mut self.recording else {
             return Ok(());
         };
-        let mut rows = std::mem::take(&mut self.pending);
-        let end = rows
-            .t_s
-            .partition_point(|t| (t * rate_hz).round() < to as f64);
-        let mut behind = Batch::default();
-        append(&mut behind, &rows);
-        cut(&mut behind, end);
-        shorten(&mut rows, end);
-        let begin = rows
-            .t_s
-            .partition_point(|t| (t * rate_hz).round() < dwell.from as f64);
+        let end = self.pending.before(to);
+        let begin = self.pending.before(dwell.from);
+        let mut rows = self.pending.take(end);
         let input = known(&dwell.step, config);
         for row in begin..end {
             rows.step[row] = self.number;
@@ -556,7 +556,6 @@ impl UnitSession {
         }
         let from_s = rows.t_s.get(begin).copied().unwrap_or(0.0);
         recording.write(&rows)?;
-        self.pending = behind;
         let (rows, bytes) = recording.settled()?;
         let number = self.number;
         self.folder.add(Entry::Dwell {
@@ -573,6 +572,7 @@ impl UnitSession {
             temp_c: seen.temp_c.is_finite().then_some(seen.temp_c),
         })?;
         self.number += 1;
+        self.away = false;
         (self.dwell, self.done, self.state.left_s) = (None, self.spin.is_none(), None);
         tell.push(Event::Dwell {
             unit: self.name(),

@@ -470,6 +470,7 @@ mod tests {
             temp_c: 20.0 + tick as f64 / 60e3,
             saturated: false,
             self_test: false,
+            crystal_ns: None,
             power_on_s: None,
         }
     }

@@ -9,7 +9,7 @@ use mimu_recording::error::{Error, Result};
 use crate::axes;
 use crate::event::{Event, Phase, Question, SessionState, UserRequest, View};
 use crate::folder::{Entry, Part};
-use crate::procedure::{SessionConfig, next_step};
+use crate::procedure::{Fixture, SAME_POSE_DEG, SessionConfig, next_step};
 use crate::turn::pause;
 use crate::unit_session::{Round, UnitSession};
 use crate::waiting::Waiting;
@@ -307,7 +307,7 @@ impl<'a> Wizard<'a> {
     fn choose(&mut self, part: Part) -> Option<Step> {
         let going_by_targets = part == Part::Calibration && self.config.by_targets;
         if !going_by_targets {
-            return (!self.queue.is_empty()).then(|| self.queue.remove(0));
+            return self.queued();
         }
         let met = self.units.iter().all(|u| u.progress.missed() == [false; 2]);
         let done = self
@@ -317,8 +317,8 @@ impl<'a> Wizard<'a> {
         if met && done >= self.config.fewest_dwells() || done >= self.config.most_dwells {
             return None;
         }
-        if !self.queue.is_empty() {
-            return Some(self.queue.remove(0));
+        if let Some(step) = self.queued() {
+            return Some(step);
         }
         let worst = self
             .units
@@ -326,6 +326,17 @@ impl<'a> Wizard<'a> {
             .find(|u| u.progress.missed() != [false; 2])?;
         let had: Vec<Step> = worst.folder.dwells(part).into_iter().map(|d| d.1).collect();
         Some(next_step(&self.config, &had, worst.progress.missed()))
+    }
+
+    /// The next dwell of the queue. By hand one that differs from the last pose comes first: the same pose again is no turn.
+    fn queued(&mut self) -> Option<Step> {
+        let last = self.units.first().and_then(|u| u.folder.last_dwell());
+        let last = last.filter(|_| self.config.fixture != Fixture::Table);
+        let differs = |s: &Step| {
+            last.is_none_or(|last| s.up().angle(&last.up()).to_degrees() >= SAME_POSE_DEG)
+        };
+        let at = self.queue.iter().position(differs).unwrap_or(0);
+        (!self.queue.is_empty()).then(|| self.queue.remove(at))
     }
 
     async fn step(&mut self, step: &Step) -> Result<Stepped> {

@@ -127,8 +127,9 @@ const CHECK: &str =
     "check range, columns and unit of the readings and record again, or write it all the same";
 
 pub(crate) fn run(args: &FitArgs) -> Result<Status> {
-    // A part that is not known is refused before anything is computed.
+    // Before anything is computed: a part that is not known, and a file that would be replaced.
     args.part.part()?;
+    args.writing.check(args.output.as_deref())?;
     if let (Some(prior), [_, second, ..]) = (&args.prior, &args.recordings[..]) {
         return Err(Error::new(
             prior.display(),
@@ -164,14 +165,12 @@ fn prepared(args: &FitArgs, recording: &Path) -> Result<Prepared> {
     let inputs = [args.noise.file.as_deref(), args.prior.as_deref()];
     let search = args.still.search();
     let prepared = read_samples_or_means(recording, &args.log, search, &outputs, &inputs)?;
-    args.writing.check(args.output.as_deref())?;
     let prepared = args.keep.apply(args.noise.apply(prepared)?);
     let prepared = args.whole.apply(prepared)?;
     let prepared = match &args.reference_error {
         Some(file) => prepared.with_reference_error(ReferenceError::read(file)?),
         None => prepared,
     };
-    refuse_reference_error(&prepared, args.method)?;
     let prior = args.prior.as_deref().map(Prior::read).transpose()?;
     let prepared = match prior {
         Some(prior) => prepared.with_prior(Arc::new(prior))?,
@@ -188,23 +187,6 @@ fn prepared(args: &FitArgs, recording: &Path) -> Result<Prepared> {
         ));
     }
     Ok(prepared)
-}
-
-/// Errors of the reference are used by least squares with known inputs only.
-fn refuse_reference_error(prepared: &Prepared, method: Option<MethodArg>) -> Result<()> {
-    let by_means = matches!(
-        method,
-        None | Some(MethodArg::LeastSquares | MethodArg::Kalman)
-    );
-    let used = prepared.manifest.reference == Reference::Table && by_means;
-    if prepared.reference_error().is_none() || used {
-        return Ok(());
-    }
-    Err(Error::new(
-        &prepared.place,
-        "errors of the reference are stated, and this fit does not use them",
-        "they are for known inputs (reference = \"table\") and the methods least-squares and kalman",
-    ))
 }
 
 /// Fits a recording. After a refusal the user first needs the list of dwells; the error line comes last.

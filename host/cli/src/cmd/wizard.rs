@@ -144,7 +144,7 @@ pub(crate) struct TextArgs {
     /// Name of the unit [default: its port]
     #[arg(long, value_name = "NAME", requires = "text")]
     device: Option<String>,
-    /// Use the board's clock although it does not agree with this computer's: for a replay
+    /// Keep the times of the board's clock instead of converting them to this computer's: for a replay
     #[arg(long, requires = "text")]
     trust_clock: bool,
 }

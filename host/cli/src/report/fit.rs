@@ -149,6 +149,9 @@ fn recorded(out: &mut String, fit: &FitResult, verbose: bool) {
         1.0 / fit.period_s,
         fit.gravity_mps2
     );
+    if let Some(clock) = fit.clock {
+        let _ = writeln!(out, "time: {}", clock.described());
+    }
     let lengths = || fit.dwells.iter().map(|d| d.duration_s);
     let (shortest, longest) = (
         lengths().fold(f64::INFINITY, f64::min),

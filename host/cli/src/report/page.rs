@@ -62,8 +62,10 @@ pub fn number(si: f64, factor: f64, unit: &str) -> Markup {
 /// `text` with a minus sign instead of a hyphen, and powers of ten in superscript.
 pub fn written(text: &str) -> String {
     let text = match text.split_once('e') {
-        Some((digits, power)) => format!("{digits}·10{}", raised(power)),
-        None => text.into(),
+        Some((digits, power)) if power.parse::<i32>().is_ok() => {
+            format!("{digits}·10{}", raised(power))
+        }
+        _ => text.into(),
     };
     text.replace('-', "−")
 }

@@ -183,7 +183,7 @@ fn unit_text(unit: &UnitOutcome, text: &mut String) {
         unit.discarded
     );
     if let Some(clock) = &unit.clock {
-        let _ = writeln!(text, "time: {}", clock.words());
+        let _ = writeln!(text, "time: {}", clock.described());
     }
     let judged = unit.confirmed.as_ref().or(unit.verified.as_ref());
     for line in judged.into_iter().flat_map(judged_lines) {

@@ -98,6 +98,7 @@ impl Calibration {
                 reference: Some(unit.reference),
                 raw_unit: unit.raw_unit,
                 gravity_mps2: Some(unit.gravity_mps2),
+                clock: None,
                 temp_c: Some(unit.temp_c),
                 temp_range_c: Some(unit.temperature.range_c),
             },

@@ -80,6 +80,7 @@ impl Calibration {
                 reference: None,
                 raw_unit: stored.raw_unit,
                 gravity_mps2: None,
+                clock: None,
                 temp_c: Some(f64::from(node.temp_c)),
                 temp_range_c: range_c.filter(|_| temperature.is_none()),
             },

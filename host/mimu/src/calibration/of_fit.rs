@@ -53,6 +53,7 @@ impl Calibration {
                 reference: Some(manifest.reference),
                 raw_unit: manifest.raw_unit,
                 gravity_mps2: Some(manifest.gravity_mps2),
+                clock: manifest.clock,
                 temp_c: mean.is_finite().then_some(mean),
                 temp_range_c: range(&temperatures),
             },

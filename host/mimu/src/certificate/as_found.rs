@@ -8,7 +8,8 @@ use crate::calibration::{Calibration, TriadTable};
 use crate::fit::Fit;
 use crate::parameter::{TriadParameter, parameters};
 use crate::quantity::Sensor;
-use mimu_recording::error::Result;
+use mimu_recording::are_two_units;
+use mimu_recording::error::{Error, Result};
 
 /// The calibration that the unit had, beside the new one.
 #[derive(Debug, Clone, Serialize)]
@@ -82,8 +83,24 @@ impl AsFound {
     /// The calibration `old` from the file `file` beside `made`, which is that of `fit`.
     ///
     /// # Errors
-    /// Calibrations of readings in different units, or without a common sensor.
+    /// Calibrations of two units, of readings in different units, or without a common sensor.
     pub fn of(fit: &Fit, made: &Calibration, old: &Calibration, file: &str) -> Result<Self> {
+        let numbers = old.unit_id.as_ref().zip(made.unit_id.as_ref());
+        let other = match numbers {
+            Some((old, new)) => !old.eq_ignore_ascii_case(new),
+            None => are_two_units(&old.device, &made.device),
+        };
+        if other {
+            let problem = format!(
+                "it is of {:?}, and the recording of {:?}",
+                old.device, made.device
+            );
+            return Err(Error::new(
+                file,
+                problem,
+                "give the calibration that this unit had",
+            ));
+        }
         let both = [
             (file.to_owned(), old.clone()),
             ("the new calibration".to_owned(), made.clone()),

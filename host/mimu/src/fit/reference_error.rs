@@ -12,7 +12,7 @@ use crate::estimate::{Estimated, Observation, known_input};
 use crate::prepared::Prepared;
 use crate::quantity::Sensor;
 use crate::signal::dwell::Dwell;
-use crate::triad::{Covariance, Part, Triad, vector};
+use crate::triad::{Covariance, NORMAL_95, Part, Triad, vector};
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{Reference, ReferenceError};
 
@@ -32,6 +32,8 @@ pub enum Cause {
     Tilt,
     /// The right angles between the axes of the table.
     Orthogonality,
+    /// The clock of the samples.
+    Time,
 }
 
 impl Cause {
@@ -44,6 +46,7 @@ impl Cause {
             Self::Level => "level",
             Self::Tilt => "tilt",
             Self::Orthogonality => "orthogonality",
+            Self::Time => "time",
         }
     }
 }
@@ -258,16 +261,28 @@ pub(super) fn refuse_unused(prepared: &Prepared, method: Method) -> Result<()> {
 /// by the same share, which no pose shows. `None` if no such error is stated.
 pub(super) fn with_gravity(triad: &Triad, prepared: &Prepared) -> Option<(Triad, Influence)> {
     let sigma = prepared.reference_error.as_ref()?.standard().gravity_mps2;
-    let share = sigma / prepared.manifest.gravity_mps2;
+    scaled(
+        triad,
+        Cause::Gravity,
+        sigma / prepared.manifest.gravity_mps2,
+    )
+}
+
+/// A gyro whose reference are angles between rests, and what the error of the clock adds: an angle is a rate times a time. `None` if the clock was compared
+/// with no other. Known rates need no clock.
+pub(super) fn with_clock(triad: &Triad, prepared: &Prepared) -> Option<(Triad, Influence)> {
+    let clock = prepared.manifest.clock?;
+    scaled(triad, Cause::Time, clock.half_width / NORMAL_95)
+}
+
+/// All scale factors err by one share, of this standard deviation.
+fn scaled(triad: &Triad, cause: Cause, share: f64) -> Option<(Triad, Influence)> {
     let by = vector(&(triad.forward.matrix * share), &Vector3::zeros());
-    let influence = Influence {
-        cause: Cause::Gravity,
-        covariance: by * by.transpose(),
-    };
+    let covariance = by * by.transpose();
     let mut parts = triad.forward_parts.clone();
-    parts.push(Part::known(influence.covariance));
-    let triad = Triad::from_forward(triad.forward, parts).filter(|_| sigma > 0.0)?;
-    Some((triad, influence))
+    parts.push(Part::known(covariance));
+    let triad = Triad::from_forward(triad.forward, parts).filter(|_| share > 0.0)?;
+    Some((triad, Influence { cause, covariance }))
 }
 
 /// Angles of the table by the direction that is up, rad: tilt about the level axis, turn about the body's z axis. `None` without a force. The body is first

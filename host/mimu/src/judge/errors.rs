@@ -1,20 +1,20 @@
 //! Error figures, judged by the size of the input and by what is predicted of them.
 
 use crate::judgement::{Judgement, JudgementKind};
-use crate::quantity::{Figure, Sensor, significant};
+use crate::quantity::{Sensor, significant};
 use crate::unseen::Test;
 
 /// Largest share of the input that a calibration may leave unexplained. Consumer parts leave their factory with scale factors within 3 %
 /// and zeros within 50 to 80 mg (MPU-6050, BMI160, LSM6DS3), so a calibration that errs by more does worse than the data sheet.
 pub const UNEXPLAINED_SHARE: f64 = 0.05;
 
-/// Error figures of a sensor, all in the unit of `figure`.
+/// Error figures of a sensor, all in one unit: SI, or that of the readings.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ErrorFigures {
     /// The sensor.
     pub sensor: Sensor,
-    /// The quantity that they describe.
-    pub figure: Figure,
+    /// Factor and unit in which people read them.
+    pub readable: (f64, &'static str),
     /// Rms error: of data that were held out or belong to another recording, or else of those that the model was fitted to.
     pub error: f64,
     /// Whether the model has not seen the data of [`Self::error`].
@@ -40,7 +40,7 @@ impl ErrorFigures {
     }
 
     fn written(&self, error: f64) -> String {
-        let (factor, unit) = self.figure.readable(self.sensor);
+        let (factor, unit) = self.readable;
         format!("{} {unit}", significant(error * factor))
     }
 
@@ -145,13 +145,14 @@ pub fn judge(all: &[ErrorFigures]) -> Judgement {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::quantity::Figure;
     use crate::unseen::{BEYOND_NOISE, VISIBLE};
     use JudgementKind::{Good, Misfit, Unexplained, Untested};
 
     fn figures(sensor: Sensor, ratio: f64, unseen: bool) -> ErrorFigures {
         ErrorFigures {
             sensor,
-            figure: Figure::GravityMagnitude,
+            readable: Figure::GravityMagnitude.readable(sensor),
             error: 0.001 * ratio,
             unseen,
             input: 9.8,

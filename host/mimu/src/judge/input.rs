@@ -18,6 +18,7 @@ pub fn of_warning(warning: &Warning) -> Option<JudgementKind> {
         | Warning::ImplausibleRate { .. }
         | Warning::Restless { .. }
         | Warning::RateOff { .. }
+        | Warning::TrustedClock(_)
         | Warning::Gravity { .. }
         | Warning::OtherGravity {
             contradicted: true, ..

@@ -17,7 +17,7 @@ impl ErrorFigures {
         let held_out = sensor.held_out_rms();
         Self {
             sensor: sensor.sensor,
-            figure: sensor.figure,
+            readable: sensor.figure.readable(sensor.sensor),
             error: held_out.unwrap_or(sensor.rms()),
             unseen: held_out.is_some(),
             input: input_size(&fit.prepared, sensor),

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use mimu_recording::{RawUnit, Reference};
+use mimu_recording::{ClockRate, RawUnit, Reference};
 use serde::Serialize;
 
 use super::TOOL;
@@ -40,6 +40,9 @@ pub struct FitResult {
     pub raw_unit: RawUnit,
     /// Local gravity, m/s².
     pub gravity_mps2: f64,
+    /// How fast the clock of the samples runs, if it was compared with a better one; absent otherwise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub clock: Option<ClockRate>,
     /// Estimator where the input is known.
     pub method: &'static str,
     /// Whether it was a table of means, one row for each pose, instead of samples.
@@ -268,6 +271,7 @@ impl FitResult {
             reference: manifest.reference,
             raw_unit: manifest.raw_unit,
             gravity_mps2: manifest.gravity_mps2,
+            clock: manifest.clock,
             method: fit.options.method.name(),
             means: manifest.means,
             rows: condensed.rows,

@@ -25,7 +25,7 @@ use contradiction::{FALSE_FINDING, Finding, Kind, Triads};
 use mixture::Matched;
 use together::Direction;
 
-use crate::fit::{Fit, Options, fit};
+use crate::fit::{Cause, Fit, Influence, Options, fit};
 use crate::parameter::{ParameterKind, TriadParameter};
 use crate::prepared::Prepared;
 use crate::quantity::{PerSensor, Sensor};
@@ -55,7 +55,9 @@ pub struct Sessions {
 /// Refuses fits that count errors of the reference: these are common to the sessions, and the model of the sessions takes each fit's errors as its own, so
 /// that its intervals would be too narrow.
 fn refuse_common_errors(fits: &[Fit]) -> Result<()> {
-    let counts = |fit: &&Fit| fit.sensors.iter().any(|s| !s.influences.is_empty());
+    // Each session compares the clocks anew.
+    let common = |i: &Influence| i.cause != Cause::Time;
+    let counts = |fit: &&Fit| fit.sensors.iter().any(|s| s.influences.iter().any(common));
     match fits.iter().find(counts) {
         Some(fit) if fits.len() > 1 => Err(Error::new(
             &fit.prepared.place,

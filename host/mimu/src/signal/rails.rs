@@ -1,6 +1,6 @@
 //! Channels that do not follow their input: at a rail of the converter, stuck, or dead.
 
-use crate::signal::blocks::{Condensed, Moments, Rails, extent, quantile};
+use crate::signal::blocks::{Block, Condensed, Moments, Rails, extent, quantile};
 use crate::warning::Warning;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::health::{Constant, Extreme, Fault, Finding, channel_run_by_chance};
@@ -29,6 +29,8 @@ const CALM_BLOCKS: usize = 3;
 /// counts. (A gyro that is turned one way only rests at an end of its range: its other blocks all contain motion.) With ten samples of the
 /// same noise per block, one block in four hundred is as calm by chance, and three in a row one in sixty million.
 const CALM: f64 = 0.4;
+/// Standard deviation of a block at rest, relative to the quietest twentieth of the blocks: with ten samples, one of noise alone exceeds it in a thousand.
+const AT_REST: f64 = 3.0;
 /// Share of the range that counts as near an extreme.
 const NEAR: f64 = 0.1;
 
@@ -45,7 +47,23 @@ fn calm_end(condensed: &Condensed, c: usize, sign: f64, range: [f64; 2]) -> Opti
         let all = condensed.blocks.iter().map(move |b| b.raw[c]);
         all.filter(|m| m.n > 2)
     };
-    let blocks: Vec<Moments> = blocks_of(c).collect();
+    // A block in which the other sensor is as calm as it ever is, is a rest: a gyro that is turned one way only rests at an end of its range, and lies on a
+    // table stiller than any hand holds it.
+    let others: Vec<(usize, f64)> = (if c < 3 { 3..6 } else { 0..3 })
+        .filter(|o| condensed.has_raw[*o])
+        .filter_map(|o| {
+            let mut all: Vec<f64> = blocks_of(o).map(|m| deviation(&m)).collect();
+            Some((o, AT_REST * quantile(&mut all, 0.05)?))
+        })
+        .collect();
+    let moves = |b: &&Block| {
+        others.is_empty()
+            || others
+                .iter()
+                .any(|(o, still)| deviation(&b.raw[*o]) > *still)
+    };
+    let moving = condensed.blocks.iter().filter(moves).map(|b| b.raw[c]);
+    let blocks: Vec<Moments> = moving.filter(|m| m.n > 2).collect();
     let elsewhere = blocks
         .iter()
         .filter(|m| m.mean > low + near && m.mean < high - near);

@@ -5,6 +5,7 @@ use std::ops::Range;
 use mimu_recording::Batch;
 
 use crate::procedure::SessionConfig;
+use crate::source::Chunk;
 use mimu_equipment::step::Step;
 
 /// Known inputs of a dwell on a table: rates against the ground, deg/s, and specific forces, m/s². The estimators add the Earth's rate.
@@ -27,24 +28,69 @@ pub(super) fn part(rows: &Batch, range: Range<usize>) -> Batch {
     out
 }
 
-/// Removes the first rows.
-pub(super) fn cut(rows: &mut Batch, first: usize) {
-    rows.t_s.drain(..first);
-    rows.step.drain(..first);
-    rows.temp_c.drain(..first);
-    for c in 0..6 {
-        rows.raw[c].drain(..first);
-        rows.reference[c].drain(..first);
-    }
+/// Rows that no dwell has taken yet, with their ticks.
+#[derive(Debug, Default)]
+pub(super) struct Pending {
+    /// The rows.
+    pub rows: Batch,
+    ticks: Vec<u64>,
+    /// What is added to the times of chunks so that they never go back, s: a source that was opened again counts its time anew.
+    later_s: f64,
+    /// Time of the last sample, s.
+    last_s: Option<f64>,
 }
 
-/// Removes the rows from index `to` on.
-pub(super) fn shorten(rows: &mut Batch, to: usize) {
-    rows.t_s.truncate(to);
-    rows.step.truncate(to);
-    rows.temp_c.truncate(to);
-    for c in 0..6 {
-        rows.raw[c].truncate(to);
-        rows.reference[c].truncate(to);
+impl Pending {
+    /// Appends the samples of a chunk of a unit of this nominal rate.
+    pub fn add(&mut self, chunk: &Chunk, rate_hz: f64) {
+        for ((k, t_s), row) in (0..).zip(chunk.times(rate_hz)).zip(&chunk.values) {
+            let least_s = self.last_s.map_or(t_s, |last| last + 0.5 / rate_hz);
+            if t_s + self.later_s < least_s {
+                self.later_s = least_s + 0.5 / rate_hz - t_s;
+            }
+            self.last_s = Some(t_s + self.later_s);
+            self.ticks.push(chunk.tick + k);
+            let rows = &mut self.rows;
+            rows.t_s.push(t_s + self.later_s);
+            rows.step.push(-1);
+            rows.temp_c.push(chunk.temp_c);
+            for c in 0..6 {
+                rows.raw[c].push(row[c]);
+                rows.reference[c].push(f64::NAN);
+            }
+        }
+    }
+
+    /// Number of rows before this tick.
+    pub fn before(&self, tick: u64) -> usize {
+        self.ticks.partition_point(|t| *t < tick)
+    }
+
+    /// Takes the rows before index `to`, and keeps the others.
+    pub fn take(&mut self, to: usize) -> Batch {
+        let mut rows = part(&self.rows, 0..to);
+        for c in 0..6 {
+            rows.reference[c].extend(&self.rows.reference[c][..to]);
+        }
+        self.cut(to);
+        rows
+    }
+
+    /// Removes the first rows.
+    pub fn cut(&mut self, first: usize) {
+        self.ticks.drain(..first);
+        let rows = &mut self.rows;
+        rows.t_s.drain(..first);
+        rows.step.drain(..first);
+        rows.temp_c.drain(..first);
+        for c in 0..6 {
+            rows.raw[c].drain(..first);
+            rows.reference[c].drain(..first);
+        }
+    }
+
+    /// Forgets the rows, but not the time.
+    pub fn clear(&mut self) {
+        self.cut(self.rows.len());
     }
 }

@@ -6,7 +6,6 @@ use mimu::prepared::Prepared;
 use mimu::quantity::significant;
 use mimu::signal::stillness::STILL_FACTOR;
 use mimu::spun::{End, Spun, is_clipped};
-use mimu_recording::Batch;
 use mimu_recording::error::Result;
 use mimu_recording::health::Fault;
 use nalgebra::Vector3;
@@ -371,17 +370,12 @@ impl UnitSession {
         let (Some(recording), Some([gyro, accel])) = (&self.recording, &self.fitted) else {
             return Err(unusable());
         };
-        let rate_hz = self.station.unit.rate_hz;
-        let before = |rows: &Batch, tick: u64| {
-            rows.t_s
-                .partition_point(|t| (t * rate_hz).round() < tick as f64)
-        };
         let all = &recording.samples;
         let others = |step: &i32| *step != -1 && *step != from.number;
         let first = all.step.iter().rposition(others).map_or(0, |at| at + 1);
         let mut rows = part(all, first..all.len());
-        let mut ends = part(&self.pending, 0..before(&self.pending, to));
-        let begin = before(&ends, dwell.from);
+        let mut ends = part(&self.pending.rows, 0..self.pending.before(to));
+        let begin = self.pending.before(dwell.from);
         ends.step[begin..].fill(self.number);
         append(&mut rows, &ends);
         let prepared = Prepared::of(recording.manifest().clone(), &rows, STILL_FACTOR)

@@ -7,6 +7,7 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 
 use mimu::calibration::{Calibration, TriadTable};
 use mimu_cli::called::{Refusal, Session, wizard};
+use mimu_recording::{ClockRate, Manifest, Times};
 use mimu_wizard::event::{Event, Question, SessionState, UserRequest, View};
 use mimu_wizard::procedure::faces;
 use mimu_wizard::relay::{Arrival, Stamped};
@@ -150,6 +151,57 @@ fn a_session_that_is_relayed_is_unplugged_stopped_and_gone_on_with_and_its_inter
         Some(out.join("calibration.toml").display().to_string())
     );
     judge(&out.join("calibration.toml"), "");
+}
+
+#[test]
+fn times_of_a_clock_three_percent_fast_are_converted_and_the_intervals_hold() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let fast = |line: String| match line
+        .split_once(',')
+        .map(|(t, rest)| (t.parse::<f64>(), rest))
+    {
+        Some((Ok(t_us), rest)) if t_us > 1e5 => format!("{:.0},{rest}", 1.03 * t_us),
+        _ => line,
+    };
+    let lines: Vec<String> = lines().into_iter().map(fast).collect();
+    let mut relay = begin(&out);
+    relay.send(0.0, Arrival::Opened);
+    let (outcome, refused) = relay.hear(&lines, &mut 0, usize::MAX).unwrap();
+    assert_eq!(refused, None);
+    let clock = outcome.unwrap().units[0].clock.unwrap();
+    // The relay counts lost lines as no time: 0.02 %.
+    assert!(
+        (clock.factor - 1.03).abs() < clock.half_width + 3e-4,
+        "{clock:?}"
+    );
+    // A scale factor uncorrected errs by 0.03: ten halves of its interval.
+    judge(&out.join("calibration.toml"), "");
+    let manifest = out.join("calibration/recording.toml");
+    let written = Manifest::read(&manifest).unwrap().clock.unwrap();
+    assert!(
+        written.half_width < 3e-4 && written.times == Times::Board,
+        "{written:?}"
+    );
+    let made = Calibration::read(&out.join("calibration.toml")).unwrap();
+    let computer = ClockRate {
+        times: Times::Computer,
+        ..written
+    };
+    assert_eq!(made.recording.clock, Some(computer));
+    let text = std::fs::read_to_string(&manifest).unwrap();
+    let trusted = text.replace("times = \"board\"", "times = \"trusted\"");
+    std::fs::write(&manifest, trusted).unwrap();
+    let fit = Command::new(env!("CARGO_BIN_EXE_mimu"))
+        .arg("fit")
+        .arg(out.join("calibration"))
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&fit.stdout);
+    assert!(
+        said.contains("judgement: suspect: the clock of its samples runs 1.03"),
+        "{said}"
+    );
 }
 
 /// A population of a hundred units in counts: scale factors of the MPU-6050 within 1.5 %, axes within 20 mrad, biases within 300 and 600 counts. `larger`: by how

@@ -74,7 +74,7 @@ fn figures(
 ) -> ErrorFigures {
     ErrorFigures {
         sensor,
-        figure: s.figure,
+        readable: s.figure.readable(sensor),
         error: s.rms,
         unseen,
         input: input_size(prepared, sensor, s.figure),
