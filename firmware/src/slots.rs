@@ -163,9 +163,11 @@ impl<F: NorFlash> Slots<F> {
     }
 
     /// Stores a calibration and its front end. When this returns, or if the supply fails meanwhile, either the new calibration is in use,
-    /// complete, or the previous one. If it is in use already, it is not written again: a sector lasts for 10 000 erases.
+    /// complete, or the previous one. If it is in use already, with a readable front end and beside no unusable one, it is not written again: a sector lasts for
+    /// 10 000 erases.
     pub async fn store(&mut self, bytes: &[u8], front_end: &FrontEnd) -> Result<(), Failed> {
-        if self.holds(bytes).await {
+        let whole = !self.younger_unusable && self.front_end().await.is_some();
+        if whole && self.holds(bytes).await {
             return Ok(());
         }
         let slot = match self.in_use {

@@ -175,15 +175,15 @@ class Fit(Result):
         return self._native.calibration()
 
     @overload
-    def apply(self, gyro: ArrayLike, accel: ArrayLike) -> tuple[Array, Array]: ...
+    def apply(self, gyro: ArrayLike, accel: ArrayLike, *, units: str | None = None) -> tuple[Array, Array]: ...
     @overload
-    def apply(self, gyro: ArrayLike, accel: None = None) -> tuple[Array, None]: ...
+    def apply(self, gyro: ArrayLike, accel: None = None, *, units: str | None = None) -> tuple[Array, None]: ...
     @overload
-    def apply(self, gyro: None = None, *, accel: ArrayLike) -> tuple[None, Array]: ...
+    def apply(self, gyro: None = None, *, accel: ArrayLike, units: str | None = None) -> tuple[None, Array]: ...
     @overload
     def apply(self, gyro: Recording) -> tuple[Array | None, Array | None]: ...
 
-    def apply(self, gyro: Any = None, accel: Any = None) -> Any:
+    def apply(self, gyro: Any = None, accel: Any = None, *, units: str | None = None) -> Any:
         """Compensated readings in rad/s and m/s², a row for each sample.
 
         Parameters
@@ -192,6 +192,8 @@ class Fit(Result):
             Readings in the unit of the recording. A :class:`mimu.Recording` stands for both sensors.
         accel : array_like of shape (n, 3) or DataFrame, optional
             Readings in the unit of the recording.
+        units : str, optional
+            Units of gyro and accel, such as ``deg/s,g``; by default those that the recording was given.
 
         Returns
         -------
@@ -202,7 +204,7 @@ class Fit(Result):
         --------
         >>> rate, force = fit.apply(gyro, accel)
         """
-        return self.calibration.apply(gyro, accel)
+        return self.calibration.apply(gyro, accel, units=units)
 
     def to_toml(self) -> str:
         """The calibration file that ``mimu fit -o`` writes."""

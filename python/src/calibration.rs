@@ -5,7 +5,8 @@ use std::sync::Arc;
 
 use mimu::calibration::Calibration as Model;
 use mimu::calibration::apply::Compensated;
-use mimu::quantity::{PerSensor, Sensor};
+use mimu::quantity::{PerSensor, Sensor, significant};
+use mimu::readable::STANDARD_GRAVITY;
 use mimu_cli::report::fragment;
 use mimu_core::compensation::Affine;
 use mimu_export::{Sources, json as as_json};
@@ -18,7 +19,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::error::raised;
-use crate::recording::{Recording, triad};
+use crate::recording::{Recording, ordered, triad, units_of};
 use crate::work::{computed, loaded};
 
 /// Compensated readings of gyro and accelerometer.
@@ -30,6 +31,9 @@ type Both<'py> = (
 /// The same as what they were given as: arrays, or tables of pandas.
 type Applied<'py> = (Option<Bound<'py, PyAny>>, Option<Bound<'py, PyAny>>);
 
+/// A calibration in a pickle: the function that reads it, and its text, name and units.
+type Pickled<'py> = (Bound<'py, PyAny>, (String, String, Option<String>));
+
 /// C and o of one triad.
 type MatrixAndOffset<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>);
 
@@ -39,6 +43,8 @@ pub(crate) struct Calibration {
     pub(crate) model: Arc<Model>,
     /// Its file, or the name of the result that it comes from.
     pub(crate) name: String,
+    /// Units of the arrays that it was fitted to, if these were converted to SI: arrays are taken in the same.
+    pub(crate) units: Option<String>,
 }
 
 #[pymethods]
@@ -109,6 +115,8 @@ impl Calibration {
     ///     Readings in `unit`.
     /// accel : array_like of shape (n, 3) or DataFrame, optional
     ///     Readings in `unit`.
+    /// units : str, optional
+    ///     Units of gyro and accel, such as ``deg/s,g``. By default those of the arrays that it was fitted to, else SI. For counts and volts there is none.
     /// temp : array_like of shape (n,), optional
     ///     Temperatures, degrees Celsius.
     /// t : array_like of shape (n,), optional
@@ -118,7 +126,7 @@ impl Calibration {
     /// -------
     /// tuple of two arrays of shape (n, 3), or DataFrames like those given
     ///     Rates in rad/s and specific forces in m/s²; None for a sensor that was not given.
-    #[pyo3(signature = (gyro=None, accel=None, *, temp=None, t=None))]
+    #[pyo3(signature = (gyro=None, accel=None, *, temp=None, t=None, units=None))]
     fn apply<'py>(
         &self,
         py: Python<'py>,
@@ -126,7 +134,18 @@ impl Calibration {
         accel: Option<&Bound<'py, PyAny>>,
         temp: Option<&Bound<'py, PyAny>>,
         t: Option<&Bound<'py, PyAny>>,
+        units: Option<&str>,
     ) -> PyResult<Applied<'py>> {
+        let [gyro, accel] = [gyro, accel].map(|table| match table {
+            Some(table) => ordered(table).map(Some),
+            None => Ok(None),
+        });
+        let (gyro, accel) = (gyro?, accel?);
+        let (gyro, accel) = (gyro.as_ref(), accel.as_ref());
+        if let (Some(remembered), Some(accel), None) = (&self.units, accel, units) {
+            self.check_gravity(py, accel, remembered)?;
+        }
+        let units = units.or(self.units.as_deref());
         let shaped_like = |(rate, force): Both<'py>| -> PyResult<Applied<'py>> {
             Ok((like(gyro, rate)?, like(accel, force)?))
         };
@@ -140,7 +159,10 @@ impl Calibration {
             )),
             None if temp.is_some() || t.is_some() => {
                 let given = PyDict::new(py);
-                given.set_item("unit", self.unit())?;
+                match units {
+                    Some(units) => given.set_item("units", units)?,
+                    None => given.set_item("unit", self.unit())?,
+                }
                 given.set_item("gravity", self.model.recording.gravity_mps2)?;
                 given.set_item("device", self.device())?;
                 let columns = [("t", t), ("gyro", gyro), ("accel", accel), ("temp", temp)];
@@ -150,14 +172,17 @@ impl Calibration {
                 let recording = py.get_type::<Recording>().call((), Some(&given))?;
                 shaped_like(self.apply_to_recording(py, recording.cast::<Recording>()?.get())?)
             }
-            None => shaped_like(self.apply_to_arrays(py, gyro, accel)?),
+            None => shaped_like(self.apply_to_arrays(py, gyro, accel, units)?),
         }
     }
 
     /// For pickle and for other processes.
-    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (String, String))> {
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Pickled<'py>> {
         let made = py.import("mimu._mimu")?.getattr("parse_calibration")?;
-        Ok((made, (self.to_toml(), self.name.clone())))
+        Ok((
+            made,
+            (self.to_toml(), self.name.clone(), self.units.clone()),
+        ))
     }
 
     /// The whole calibration, as `mimu export json` writes it.
@@ -206,12 +231,57 @@ impl Calibration {
 }
 
 impl Calibration {
+    /// Refuses specific forces that are not near gravity in the units of the fit: the attributes of a recording are in SI, and the arrays that it was made of are not.
+    fn check_gravity(&self, py: Python<'_>, accel: &Bound<'_, PyAny>, units: &str) -> PyResult<()> {
+        let Ok((_, [_, Some(factor)])) = units_of(py, None, Some(units)) else {
+            return Ok(());
+        };
+        if accel.cast::<Recording>().is_ok() {
+            return Ok(());
+        }
+        let readings = triad(accel, "accel", None)?.readonly();
+        let rows = readings.as_array();
+        let mut sizes: Vec<f64> = rows
+            .rows()
+            .into_iter()
+            .map(|row| row.dot(&row).sqrt())
+            .collect();
+        sizes.retain(|size| size.is_finite());
+        sizes.sort_by(f64::total_cmp);
+        let Some(usual) = sizes.get(sizes.len() / 2) else {
+            return Ok(());
+        };
+        let times = usual * factor / STANDARD_GRAVITY;
+        if (0.3..3.0).contains(&times) {
+            return Ok(());
+        }
+        let problem = format!(
+            "its usual magnitude is {} times gravity in {units}, the units of the arrays that were fitted",
+            significant(times)
+        );
+        let remedy = "give their units, as in units=\"rad/s,m/s2\"";
+        Err(raised(py, &Error::new("accel", problem, remedy)))
+    }
+
     fn apply_to_arrays<'py>(
         &self,
         py: Python<'py>,
         gyro: Option<&Bound<'py, PyAny>>,
         accel: Option<&Bound<'py, PyAny>>,
+        units: Option<&str>,
     ) -> PyResult<Both<'py>> {
+        let ours = self.model.recording.raw_unit;
+        let (unit, factors) = match units {
+            Some(units) => units_of(py, None, Some(units))?,
+            None => (ours, [Some(1.0); 2]),
+        };
+        if unit != ours {
+            let problem = format!("it is for readings in {ours}, and units are given");
+            return Err(raised(
+                py,
+                &Error::new(&self.name, problem, "leave units out"),
+            ));
+        }
         let more = match (self.model.temperature.is_some(), self.model.effects()) {
             (true, _) => Some("it has curves over temperature"),
             (false, [_, ..]) => {
@@ -236,6 +306,17 @@ impl Calibration {
             })?;
             let readings = triad(readings, &sensor.to_string(), None)?.readonly();
             let view = readings.as_array();
+            let factor = factors[sensor as usize].ok_or_else(|| {
+                let problem = format!("the unit of the {sensor} is not given");
+                raised(
+                    py,
+                    &Error::new("units", problem, "give both units, as in units=\"deg/s,g\""),
+                )
+            })?;
+            let model = Affine {
+                matrix: model.matrix * factor,
+                ..model
+            };
             let done = py.detach(|| compensated(&model, &view));
             Ok(Some(done.into_pyarray(py)))
         };
@@ -326,16 +407,19 @@ fn shaped(clean: PerSensor<Vec<f64>>) -> Result<[Option<Array2<f64>>; 2]> {
 
 /// A calibration from the text of its file.
 #[pyfunction]
+#[pyo3(signature = (text, name, units=None))]
 pub(crate) fn parse_calibration(
     py: Python<'_>,
     text: String,
     name: String,
+    units: Option<String>,
 ) -> PyResult<Calibration> {
     let place = name.clone();
     let model = computed(py, move || Model::parse(&text, &place))?;
     Ok(Calibration {
         model: Arc::new(model),
         name,
+        units,
     })
 }
 
@@ -347,5 +431,6 @@ pub(crate) fn load_calibration(py: Python<'_>, path: PathBuf) -> PyResult<Calibr
     Ok(Calibration {
         model: Arc::new(model),
         name,
+        units: None,
     })
 }

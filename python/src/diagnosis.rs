@@ -56,6 +56,7 @@ impl Diagnosis {
         Ok(Calibration {
             model: Arc::new(made.map_err(|error| raised(py, &error))?),
             name: format!("diagnosis of {}", self.done.result.device),
+            units: None,
         })
     }
 }

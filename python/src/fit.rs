@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use mimu::fit::{Method, Options};
+use mimu::fit::{Method, Options, fit_or_faces};
 use mimu::prior::Prior;
 use mimu::quantity::Sensor;
 use mimu::result::fit::FitResult;
@@ -28,6 +28,8 @@ pub(crate) struct Fit {
     fit: mimu::Fit,
     result: FitResult,
     model: Arc<mimu::Calibration>,
+    /// Units of the arrays that the recording was made of.
+    units: Option<String>,
 }
 
 #[pymethods]
@@ -64,6 +66,7 @@ impl Fit {
         Calibration {
             model: self.model.clone(),
             name: format!("fit of {}", self.result.device),
+            units: self.units.clone(),
         }
     }
 }
@@ -110,6 +113,7 @@ impl SessionsFit {
         Calibration {
             model: self.model.clone(),
             name: format!("sessions of {}", self.result.device),
+            units: None,
         }
     }
 }
@@ -183,6 +187,7 @@ pub(crate) fn fit(
         only: only.map(named).transpose()?,
     };
     let (source, chosen) = (recording.source.clone(), method.is_some());
+    let units = recording.units.clone();
     computed(py, move || {
         let prepared = source.prepared(&by)?;
         if chosen && prepared.manifest.reference == Reference::Gravity {
@@ -196,11 +201,12 @@ pub(crate) fn fit(
             Some(path) => prepared.with_prior(Arc::new(Prior::read(&path)?))?,
             None => prepared,
         };
-        let fit = mimu::fit(prepared, options)?;
+        let fit = fit_or_faces(prepared, options)?;
         let model = mimu::Calibration::of(&fit, &[], &mimu_cli::now())?;
         Ok(Fit {
             result: FitResult::of(&fit),
             model: Arc::new(model),
+            units,
             fit,
         })
     })

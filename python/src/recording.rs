@@ -42,7 +42,26 @@ pub(crate) struct Recording {
     /// Its folder, unless it is of arrays.
     directory: Option<PathBuf>,
     /// Kept as long as the recording is used, if the folder is a temporary one.
-    folder: Option<Arc<TempDir>>,
+    folder: Option<Arc<OwnFolder>>,
+    /// Units of the arrays that it was made of, if they were converted to SI.
+    pub(crate) units: Option<String>,
+}
+
+/// A temporary folder, which only the process that made it removes: a forked child has a copy of this.
+struct OwnFolder(TempDir, u32);
+
+impl OwnFolder {
+    fn new() -> Result<Self> {
+        let made = TempDir::with_prefix("mimu-");
+        let folder = made.map_err(|e| Error::io(&std::env::temp_dir(), &e))?;
+        Ok(Self(folder, std::process::id()))
+    }
+}
+
+impl Drop for OwnFolder {
+    fn drop(&mut self) {
+        self.0.disable_cleanup(self.1 != std::process::id());
+    }
 }
 
 /// Where the samples are.
@@ -212,7 +231,7 @@ fn column<'py>(
     name: &str,
     rows: Option<usize>,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-    let array = doubles(value, name)?;
+    let array = doubles(&ordered(value)?, name)?;
     let fits = |a: &Bound<'py, PyArray1<f64>>| rows.is_none_or(|rows| a.len() == rows);
     match array.cast::<PyArray1<f64>>() {
         Ok(column) if fits(column) => Ok(column.clone()),
@@ -225,13 +244,44 @@ fn column<'py>(
     }
 }
 
+/// A table whose three columns differ in x, y and z alone, in the order x, y, z; everything else as it is.
+pub(crate) fn ordered<'py>(value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    let names = match value.getattr_opt("columns")? {
+        Some(columns) => columns.try_iter()?.collect::<PyResult<Vec<_>>>()?,
+        None => return Ok(value.clone()),
+    };
+    let text: Vec<Vec<char>> = names
+        .iter()
+        .map(|name| Ok(name.str()?.to_string().to_lowercase().chars().collect()))
+        .collect::<PyResult<_>>()?;
+    let [a, b, c] = &text[..] else {
+        return Ok(value.clone());
+    };
+    let differ = |k: &usize| a.get(*k) != b.get(*k) || a.get(*k) != c.get(*k);
+    let places: Vec<usize> = (0..a.len().max(b.len()).max(c.len()))
+        .filter(differ)
+        .collect();
+    let at = |axis: char| {
+        text.iter()
+            .position(|name| name.get(places[0]) == Some(&axis))
+    };
+    let order = match places[..] {
+        [_] => ['x', 'y', 'z'].map(at),
+        _ => return Ok(value.clone()),
+    };
+    match order {
+        [Some(x), Some(y), Some(z)] => value.get_item(vec![&names[x], &names[y], &names[z]]),
+        _ => Ok(value.clone()),
+    }
+}
+
 /// Three numbers for each sample.
 pub(crate) fn triad<'py>(
     value: &Bound<'py, PyAny>,
     name: &str,
     rows: Option<usize>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let array = doubles(value, name)?;
+    let array = doubles(&ordered(value)?, name)?;
     let fits = |a: &Bound<'py, PyArray2<f64>>| {
         a.shape()[1] == 3 && rows.is_none_or(|rows| a.shape()[0] == rows)
     };
@@ -252,7 +302,7 @@ fn parsed<T: std::str::FromStr<Err = Error>>(py: Python<'_>, name: &str) -> PyRe
 }
 
 /// Unit of the readings, and the factors of gyro and accelerometer to it.
-fn units_of(
+pub(crate) fn units_of(
     py: Python<'_>,
     unit: Option<&str>,
     units: Option<&str>,
@@ -365,7 +415,11 @@ impl Recording {
             t: t.unbind(),
         };
         let warnings = warning.into_iter().chain(of_rate).collect();
-        Self::of_arrays(py, manifest, arrays, warnings)
+        let made = Self::of_arrays(py, manifest, arrays, warnings)?;
+        Ok(Self {
+            units: units.map(str::to_owned),
+            ..made
+        })
     }
 
     /// Rows of it, as a recording of arrays: `rec[1000:]`, `rec[:-500]`.
@@ -406,7 +460,11 @@ impl Recording {
             rows: t.len(),
             t: t.unbind(),
         };
-        Self::of_arrays(py, samples.manifest.clone(), arrays, self.warnings.clone())
+        let made = Self::of_arrays(py, samples.manifest.clone(), arrays, self.warnings.clone())?;
+        Ok(Self {
+            units: self.units.clone(),
+            ..made
+        })
     }
 
     /// For pickle and for other processes: the path of a folder, the files of a temporary one, or the arrays.
@@ -414,6 +472,7 @@ impl Recording {
         let module = py.import("mimu._mimu")?;
         let said = PyDict::new(py);
         said.set_item("imported", &self.imported)?;
+        said.set_item("units", &self.units)?;
         said.set_item("warnings", &self.warnings)?;
         let Some(directory) = &self.directory else {
             let samples = self.source.samples().map_err(|error| raised(py, &error))?;
@@ -649,6 +708,7 @@ impl Recording {
             warnings,
             directory: None,
             folder: None,
+            units: None,
         })
     }
 
@@ -754,6 +814,7 @@ pub(crate) fn open(py: Python<'_>, directory: PathBuf) -> PyResult<Recording> {
         warnings: Vec::new(),
         directory: Some(directory),
         folder: None,
+        units: None,
     })
 }
 
@@ -789,7 +850,11 @@ pub(crate) fn unpickled_arrays(py: Python<'_>, said: &Bound<'_, PyDict>) -> PyRe
         rows: t.len(),
         t: t.unbind(),
     };
-    Recording::of_arrays(py, manifest, arrays, pickled(said, "warnings")?)
+    let made = Recording::of_arrays(py, manifest, arrays, pickled(said, "warnings")?)?;
+    Ok(Recording {
+        units: pickled(said, "units")?,
+        ..made
+    })
 }
 
 /// A recording in a temporary folder out of a pickle.
@@ -800,13 +865,12 @@ pub(crate) fn unpickled_files(
     said: &Bound<'_, PyDict>,
 ) -> PyResult<Recording> {
     let work = move || {
-        let made = TempDir::with_prefix("mimu-");
-        let folder = made.map_err(|e| Error::io(&std::env::temp_dir(), &e))?;
+        let folder = OwnFolder::new()?;
         for (name, content) in files {
-            let path = folder.path().join(name);
+            let path = folder.0.path().join(name);
             std::fs::write(&path, content).map_err(|e| Error::io(&path, &e))?;
         }
-        Ok((Source::open(folder.path())?, folder))
+        Ok((Source::open(folder.0.path())?, folder))
     };
     let (source, folder) = computed(py, work)?;
     Ok(Recording {
@@ -814,8 +878,9 @@ pub(crate) fn unpickled_files(
         arrays: None,
         imported: pickled(said, "imported")?,
         warnings: pickled(said, "warnings")?,
-        directory: Some(folder.path().to_owned()),
+        directory: Some(folder.0.path().to_owned()),
         folder: Some(Arc::new(folder)),
+        units: None,
     })
 }
 
@@ -831,9 +896,8 @@ pub(crate) fn read(
         let (directory, folder) = match output {
             Some(directory) => (directory, None),
             None => {
-                let made = TempDir::with_prefix("mimu-");
-                let folder = made.map_err(|e| Error::io(&std::env::temp_dir(), &e))?;
-                (folder.path().join("recording"), Some(Arc::new(folder)))
+                let folder = OwnFolder::new()?;
+                (folder.0.path().join("recording"), Some(Arc::new(folder)))
             }
         };
         let to = ["-o".into(), directory.clone().into_os_string()];
@@ -849,6 +913,7 @@ pub(crate) fn read(
         warnings: summary.warnings.iter().map(|w| keywords(w)).collect(),
         directory: Some(directory),
         folder,
+        units: None,
     })
 }
 

@@ -60,6 +60,7 @@ impl ThermalFit {
         Ok(Calibration {
             model: Arc::new(made.map_err(|error| raised(py, &error))?),
             name: format!("fit of {} over temperature", self.result.device),
+            units: None,
         })
     }
 }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 import tracemalloc
 from types import ModuleType
 
@@ -55,6 +56,34 @@ def test_compensated_arrays_follow_the_formula(arrays: mimu.Recording) -> None:
     assert fit.apply(accel=arrays.accel)[0] is None
     at_rest = np.linalg.norm(accel[:50], axis=1).mean()
     assert at_rest == pytest.approx(9.80665, abs=0.05)
+
+
+def test_arrays_are_applied_in_the_units_that_the_recording_was_given(arrays: mimu.Recording) -> None:
+    rate, force = mimu.fit(arrays).apply(arrays.gyro, arrays.accel)
+    given = (np.degrees(rate), force / 9.80665)
+    rec = mimu.Recording(arrays.t, *given, units="deg/s,g", gravity=9.80665, rate_hz=arrays.rate_hz)
+    fit = mimu.fit(rec)
+    assert rec.gyro is not None
+    np.testing.assert_allclose(rec.gyro, rate, rtol=1e-12, atol=1e-15)
+    expected = [si @ triad.C.T + triad.o for si, triad in ((rate, fit.gyro), (force, fit.accel))]
+    for calibration in (fit, fit.calibration, pickle.loads(pickle.dumps(fit.calibration))):
+        for clean, right in zip(calibration.apply(*given), expected, strict=True):
+            np.testing.assert_allclose(clean, right, rtol=1e-9, atol=1e-9)
+        in_si = calibration.apply(rate, force, units="rad/s,m/s2")
+        np.testing.assert_allclose(in_si[0], expected[0], rtol=1e-9, atol=1e-9)
+        with pytest.raises(mimu.Error, match="times gravity in deg/s,g"):
+            calibration.apply(rate, force)
+
+
+def test_columns_of_a_table_are_known_by_their_names(arrays: mimu.Recording) -> None:
+    pandas = pytest.importorskip("pandas")
+    gyro = pandas.DataFrame(arrays.gyro, columns=["gx", "gy", "gz"])[["gz", "gx", "gy"]]
+    rec = mimu.Recording(arrays.t, gyro, arrays.accel, unit="count", gravity=9.80665, rate_hz=arrays.rate_hz)
+    assert np.array_equal(rec.gyro, arrays.gyro)
+    fit = mimu.fit(arrays)
+    clean = fit.apply(gyro)[0]
+    assert list(clean.columns) == ["gx", "gy", "gz"]
+    assert np.array_equal(clean.to_numpy(), fit.apply(arrays.gyro)[0])
 
 
 def test_the_truth_of_a_unit_in_a_chamber_is_found(chamber: ModuleType) -> None:

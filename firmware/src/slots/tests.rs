@@ -355,6 +355,9 @@ fn what_a_calibration_is_tied_to_is_kept_with_it_and_its_damage_leaves_the_calib
         damaged.cells[word] = Cell::Torn(None);
         assert_eq!(front_end(&damaged), None);
         assert_eq!(found(&damaged).0.as_ref(), Some(&one));
+        // Stored again it is whole again.
+        assert!(store(&mut damaged, &one, usize::MAX, 0));
+        assert_eq!(front_end(&damaged), Some(FRONT_END));
     }
     // Of the one in use, not of the one before.
     let mut buffer = heapless::Vec::new();

@@ -98,6 +98,9 @@ impl Streamed {
     }
 }
 
+/// How often a stream is requested before its first sample.
+const ASKED: u32 = 4;
+
 /// Receives samples for `duration` of the device's time, or until `stop` returns true. `take` gets each sample with its number.
 pub fn stream(
     session: &mut Session,
@@ -112,13 +115,25 @@ pub fn stream(
     let mut expected: Option<u32> = None;
     let mut last = Instant::now();
     let before = session.count();
-    let request = Request::Stream {
-        raw: which == Stream::Raw,
-        compensated: which == Stream::Compensated,
+    let begin = |session: &mut Session| {
+        session.begin_stream(Request::Stream {
+            raw: which == Stream::Raw,
+            compensated: which == Stream::Compensated,
+        })
     };
-    session.begin_stream(request)?;
+    begin(session)?;
+    let mut asked = 1;
     'all: while !stop() {
-        let batch = match (session.stream_event(last, "stream")?, which) {
+        let event = match session.stream_event(last, "stream") {
+            // A board that is still starting, or that has just restarted, has not kept the request.
+            Err(_) if expected.is_none() && asked < ASKED => {
+                begin(session)?;
+                (asked, last) = (asked + 1, Instant::now());
+                continue;
+            }
+            event => event?,
+        };
+        let batch = match (event, which) {
             (Some(Event::Raw(batch)), Stream::Raw)
             | (Some(Event::Compensated(batch)), Stream::Compensated) => batch,
             _ => continue,

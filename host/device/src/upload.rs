@@ -32,7 +32,7 @@ pub struct Uploaded {
     pub bytes: usize,
     /// Hash of the previous calibration, if there was one.
     pub before: Option<Hash>,
-    /// The device stored the same bytes already, so nothing was written.
+    /// The device stored the same calibration already, and wrote it again only if something beside it was damaged.
     pub was_there: bool,
     /// Messages that had to be repeated.
     pub repeated: u32,
@@ -63,17 +63,16 @@ pub fn upload(
     let repeated = session.repeated();
     let was_there = before == Some(image.hash);
     let mut restarts = 0;
-    if !was_there {
-        while !send(session, image, other_unit, &progress)
-            .map_err(|error| with_stored_calibration(session, image, error))?
-        {
-            restarts += 1;
-            if restarts == BEGINNINGS {
-                let problem = format!("the device restarted in each of {BEGINNINGS} uploads");
-                let remedy = "check its supply; `mimu device info` shows the reset cause";
-                let error = Error::device(session.port(), problem, remedy);
-                return Err(with_stored_calibration(session, image, error));
-            }
+    // The device itself knows whether the slot, its front end and the other slot are as they should be.
+    while !send(session, image, other_unit, &progress)
+        .map_err(|error| with_stored_calibration(session, image, error))?
+    {
+        restarts += 1;
+        if restarts == BEGINNINGS {
+            let problem = format!("the device restarted in each of {BEGINNINGS} uploads");
+            let remedy = "check its supply; `mimu device info` shows the reset cause";
+            let error = Error::device(session.port(), problem, remedy);
+            return Err(with_stored_calibration(session, image, error));
         }
     }
     let back = download(session)?;

@@ -3,7 +3,9 @@
 //! A value of unit i, measured by operator j (or on fixture j, or on day j), is `y = μ + u_i + f_j + (uf)_ij + e`, all of them random: the model of the AIAG's Measurement Systems
 //! Analysis, 4th edition, appendix A, with any number of such factors. Variances are estimated by restricted maximum likelihood, which for complete
 //! crossed experiments gives the table of the analysis of variance with negative components left out, and needs no complete experiment. Repeatability is e; reproducibility the factors and
-//! their interactions with units. Intervals are those of a chi-square distribution with the degrees of freedom of the information matrix (Satterthwaite 1946).
+//! their interactions with units. The intervals of repeatability and of units are those of a chi-square distribution with the degrees of freedom of the information matrix
+//! (Satterthwaite 1946). Those of sums are by modified large samples (Graybill and Wang 1980): three operators have two degrees of freedom, however many the
+//! repetitions have, and Satterthwaite's interval of their sum held 82 % of 210.
 
 mod reml;
 
@@ -178,10 +180,12 @@ impl Study {
             // Derivatives of a sum of variances by their logarithms are the variances.
             interval(variance, by.dot(&(&covariance * &by)))
         };
+        // Of the logarithm of a variance with n degrees of freedom the variance is 2/n.
+        let repeated = 2.0 / covariance[(0, 0)];
         let gage = Gage {
             repeatability: sigma(&|k| k == 0),
-            reproducibility: sigma(&|k| k > 1),
-            measurement: sigma(&|k| k != 1),
+            reproducibility: self.sum(&variances, &interactions, repeated, false),
+            measurement: self.sum(&variances, &interactions, repeated, true),
             units: sigma(&|k| k == 1),
             components: names
                 .into_iter()
@@ -194,6 +198,40 @@ impl Study {
                 .collect(),
         };
         Some(gage)
+    }
+
+    /// Reproducibility, or with repeatability all that the measurement scatters by. Its interval is that of a sum of mean squares, of each factor over the measurements
+    /// of a level and of each interaction over those of a cell: a component that is estimated as zero has one too. `repeated`: degrees of freedom of repeatability.
+    fn sum(&self, variances: &[f64], interactions: &[usize], repeated: f64, all: bool) -> Sigma {
+        let factors = self.factors.len();
+        let levels = |of: &[usize]| {
+            let mut own = of.to_vec();
+            own.sort_unstable();
+            own.dedup();
+            own.len() as f64
+        };
+        let (count, units) = (self.unit.len() as f64, self.units() as f64);
+        let mut squares = Vec::new();
+        let mut own = f64::from(u8::from(all));
+        for (f, (_, of)) in self.factors.iter().enumerate() {
+            let m = levels(of);
+            let mut square = variances[2 + f] + variances[0] * m / count;
+            own -= m / count;
+            if let Some(k) = interactions.iter().position(|i| *i == f) {
+                let (cells, interaction) = (levels(&self.cells(f)), variances[2 + factors + k]);
+                let rest = 1.0 - m / cells;
+                square += interaction * m / cells;
+                squares.push([
+                    rest,
+                    interaction + variances[0] * cells / count,
+                    (cells - m - units + 1.0).max(1.0),
+                ]);
+                own -= rest * cells / count;
+            }
+            squares.push([1.0, square, m - 1.0]);
+        }
+        squares.push([own, variances[0], repeated]);
+        modified_large_samples(&squares)
     }
 
     /// Measurements of each unit.
@@ -226,6 +264,32 @@ fn interval(variance: f64, of_estimate: f64) -> Sigma {
         value,
         lower: (variance * dof / quantile(0.975)).sqrt(),
         upper: (variance * dof / quantile(0.025)).sqrt(),
+    }
+}
+
+/// Root of a sum of independent mean squares, each with its weight, value and degrees of freedom, with its interval.
+fn modified_large_samples(squares: &[[f64; 3]]) -> Sigma {
+    let sum: f64 = squares
+        .iter()
+        .map(|[weight, square, _]| weight * square)
+        .sum();
+    let reach = |upper: bool| {
+        let each = squares.iter().map(|[weight, square, dof]| {
+            let p = if upper == (*weight > 0.0) {
+                0.025
+            } else {
+                0.975
+            };
+            let quantile = ChiSquared::new(*dof).map_or(*dof, |d| d.inverse_cdf(p));
+            (weight * square * (dof / quantile - 1.0)).powi(2)
+        });
+        each.sum::<f64>().sqrt()
+    };
+    let root = |variance: f64| variance.max(0.0).sqrt();
+    Sigma {
+        value: root(sum),
+        lower: root(sum - reach(false)),
+        upper: root(sum + reach(true)),
     }
 }
 
@@ -309,6 +373,43 @@ mod tests {
             "{:?}",
             gage.repeatability
         );
+    }
+
+    #[test]
+    fn the_interval_of_the_measurement_holds_as_often_as_it_says_with_three_operators() {
+        // Normal numbers by Box and Muller from a sequence of Weyl, hashed.
+        let mut state = 1_u64;
+        let mut even = || {
+            state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+            let z = (state ^ (state >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+            let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+            ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        let mut normal =
+            || (-2.0 * (1.0 - even()).ln()).sqrt() * (std::f64::consts::TAU * even()).cos();
+        let studies = 200;
+        for between in [0.0, 0.3, 1.0] {
+            let mut held = 0;
+            for _ in 0..studies {
+                let (mut values, mut units, mut operators) = (Vec::new(), Vec::new(), Vec::new());
+                let shift = [0; 3].map(|_| between * normal());
+                for _ in 0..10 {
+                    let unit = 3.0 * normal();
+                    units.push((values.len()..values.len() + 6).collect());
+                    for k in 0..6 {
+                        values.push(unit + shift[k % 3] + normal());
+                        operators.push(Some((k % 3).to_string()));
+                    }
+                }
+                let (study, _) = Study::of(&units, &[("operator".into(), operators)], 100).unwrap();
+                let found = study.fit(&values).unwrap().measurement;
+                let truth = 1.0_f64.hypot(between);
+                held += u32::from(found.lower <= truth && truth <= found.upper);
+            }
+            let share = f64::from(held) / f64::from(studies);
+            // 200 studies scatter by 1.5 %. The method is known to hold slightly more than it says.
+            assert!((0.92..=0.995).contains(&share), "{between}: {share}");
+        }
     }
 
     #[test]

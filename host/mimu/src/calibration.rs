@@ -43,6 +43,8 @@ use mimu_recording::{
     parse_toml, read_text,
 };
 
+/// Relative difference of two ranges that are the same.
+const SAME_RANGE: f64 = 0.01;
 /// Version of the layout of a calibration at one temperature.
 const FORMAT: &str = "mimu-calibration/1";
 /// Version of the layout with curves over temperature. A program that does not know curves refuses it, instead of applying the one model.
@@ -446,7 +448,8 @@ impl Calibration {
                     ours.part, now.part
                 ));
             }
-            if ours.range != now.range {
+            // A device stores it in single precision, and a person writes three digits; ranges of a part are twice apart.
+            if (ours.range / now.range - 1.0).abs() > SAME_RANGE {
                 let of = |range: f64| format!("{} {unit}", significant(range));
                 return Some(differs("a range of", of(ours.range), of(now.range)));
             }

@@ -19,6 +19,7 @@ pub mod plausible;
 pub(crate) mod predicted;
 mod sensor;
 pub mod session_bias;
+mod six_faces;
 pub(crate) mod uncalibrated;
 
 use std::sync::Arc;
@@ -182,6 +183,19 @@ pub fn fit(prepared: Prepared, options: Options) -> Result<Fit> {
     }
     fitted.warnings.extend(warnings);
     Ok(fitted)
+}
+
+/// As [`fit`]. Six faces by hand, which leave the angles between the axes open, give scale factors and biases, with the angles of data sheets.
+///
+/// # Errors
+/// Those of [`fit`].
+pub fn fit_or_faces(prepared: Prepared, options: Options) -> Result<Fit> {
+    match fit(prepared.clone(), options) {
+        Err(error @ Error::Undetermined(_)) if prepared.prior.is_none() => {
+            six_faces::fit(prepared, options).ok_or(error)
+        }
+        done => done,
+    }
 }
 
 /// Triads whose data contradict the `prior` that they were fitted with.

@@ -62,6 +62,14 @@ pub enum Warning {
         off_percent: f64,
         manifest_hz: f64,
     },
+    /// Standard deviation of angles between axes that are taken from data sheets, rad.
+    #[error("the poses are faces and say nothing of the angles between the axes: these are taken as 0 ± {:.1} deg, as data sheets have them; hold it with edges and corners up, too", 1.96 * .sigma.to_degrees())]
+    AxesOfDataSheet { sigma: f64 },
+    /// The accelerometer's angles are those of data sheets.
+    #[error(
+        "not calibrated: its turns depend on the angles between the accelerometer's axes, which the poses leave open"
+    )]
+    FewTurns,
     /// A clock that the user trusts although it does not agree with the computer's.
     #[error("{}, and it was trusted: if the computer's is right, the gyro's scale factors err by that factor", .0.words())]
     TrustedClock(ClockRate),

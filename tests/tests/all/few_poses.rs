@@ -1,6 +1,6 @@
 //! Typical sessions of users: thirteen poses, ten on a fixture, six faces; with a disturbed dwell, or with a correct dwell that no other confirms.
 
-use mimu::fit::{Fit, Method, Options, fit};
+use mimu::fit::{Fit, Method, Options, fit, fit_or_faces};
 use mimu::judgement::{Judgement, JudgementKind};
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
@@ -500,4 +500,42 @@ fn six_positions_off_level_have_intervals_as_wide_as_their_misfit() {
         "{:?}",
         accel.warnings
     );
+}
+
+#[test]
+fn six_faces_give_scale_factors_and_biases_and_the_angles_of_data_sheets() {
+    let mut steps = String::new();
+    for up in [
+        "1.0, 0.02, -0.01",
+        "-1.0, 0.01, 0.02",
+        "0.02, 1.0, 0.01",
+        "-0.01, -1.0, 0.02",
+        "0.02, 0.01, 1.0",
+        "0.01, -0.02, -1.0",
+    ] {
+        steps += &format!("[[step]]\nup = [{up}]\ndwell_s = 4.0\n");
+    }
+    let head = THIRTEEN.split("[[step]]").next().expect("a plan");
+    let plan = format!("{head}{steps}");
+    let mut held = 0;
+    for seed in 1..13 {
+        let session = Session::of(&plan, QUIET, seed);
+        assert!(matches!(session.fit(), Err(Error::Undetermined(_))));
+        let fitted = fit_or_faces(session.prepared(), Options::default()).expect("six faces");
+        let judgement = Judgement::of_fit(&fitted);
+        assert_eq!(
+            judgement.kind,
+            JudgementKind::Untested,
+            "{seed}: {judgement}"
+        );
+        let accel = fitted.sensor(Sensor::Accel).expect("an accelerometer");
+        let found = accel.estimated.triad.physical(mimu::triad::Angles::Exact);
+        let angle = found.non_orthogonality[0].interval;
+        assert!((angle / 0.0196 - 1.0).abs() < 0.3, "{angle}");
+        let open = found.scale[0].interval / found.scale[0].value;
+        assert!(open < 2e-3, "{open}");
+        held += session.inside(&fitted)[0];
+    }
+    // Of 72 intervals of 95 %.
+    assert!(held >= 66, "{held}");
 }

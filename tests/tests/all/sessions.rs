@@ -5,7 +5,7 @@ use std::ffi::OsStr;
 use mimu::judgement::{Judgement, JudgementKind};
 use mimu::sessions::Sessions;
 use mimu::sessions::class::PartClass;
-use mimu::sessions::contradiction::Kind;
+use mimu::sessions::contradiction::{Finding, Kind};
 use mimu::{Calibration, Sensor, verify};
 use mimu_tests::sessions::{
     ARRAY_UNITS, Carrier, Life, Shares, by_others, by_single, losing, of_array, of_model, of_next,
@@ -41,6 +41,21 @@ fn a_dropped_unit_is_found_and_only_the_sessions_since_are_used() {
     let text = made.calibration.to_toml();
     let read = Calibration::parse(&text, "cal.toml").expect("it reads what it writes");
     assert_eq!(read.sessions.iter().filter(|s| s.used).count(), 3);
+}
+
+#[test]
+fn a_unit_that_ages_was_not_dropped() {
+    for seed in 1..7 {
+        let all = combined(on_bench(seed, Life::Ageing, 7));
+        let is_step = |f: &Finding| matches!(f.kind, Kind::Step(_));
+        assert!(
+            !all.findings.iter().any(is_step),
+            "{seed}: {:?}",
+            all.findings
+        );
+        let used = all.used.iter().filter(|used| **used).count();
+        assert!(used >= 6, "{seed}: {:?} {:?}", all.used, all.sentences());
+    }
 }
 
 /// Turns that lose samples, and how many samples each: by hand the fit forgives two turns.

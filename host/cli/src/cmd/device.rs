@@ -147,11 +147,25 @@ pub fn run(args: &DeviceArgs) -> Result<()> {
     }
 }
 
+/// Length of the samples that `info` reads.
+const FLAGS_SHOWN: Duration = Duration::from_millis(200);
+
 fn info(args: &PlainArgs) -> Result<()> {
     check_outputs(&[args.json.file()], &[])?;
     // The result contains the warning about versions.
-    let session = Session::open(args.port.path.as_deref())?;
-    let result = DeviceResult::new("info", session.port(), session.who());
+    let mut session = Session::open(args.port.path.as_deref())?;
+    let mut who = session.who().clone();
+    // What the samples are flagged with is in no greeting: a lost front end, a missing reference.
+    let flagged = stream(
+        &mut session,
+        Stream::Raw,
+        Some(FLAGS_SHOWN),
+        || false,
+        |_, _, _| Ok(()),
+    );
+    who.warnings
+        .extend(flagged.map_or(Vec::new(), |found| found.flagged.warnings()));
+    let result = DeviceResult::new("info", session.port(), &who);
     print(&args.json, &report::info_text(&result), &result, None)
 }
 

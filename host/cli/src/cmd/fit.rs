@@ -6,7 +6,7 @@ use std::sync::Arc;
 use clap::{Args, ValueEnum};
 use mimu::calibration::Calibration;
 use mimu::data_sheet::DataSheet;
-use mimu::fit::{Fit, Method, Options, fit};
+use mimu::fit::{Fit, Method, Options, fit_or_faces};
 use mimu::judgement::Judgement;
 use mimu::noise::noise_file::NoiseFile;
 use mimu::prepared::Prepared;
@@ -206,7 +206,7 @@ fn fitted(
 fn one(args: &FitArgs, recording: &Path) -> Result<Status> {
     let prepared = prepared(args, recording)?;
     let place = prepared.place.clone();
-    let fitted = fitted(args, prepared, fit)?;
+    let fitted = fitted(args, prepared, fit_or_faces)?;
     let result = FitResult::of(&fitted);
     let mut text = report::fit_text(&result, args.verbose.verbose);
     text += &budget_text(&result);

@@ -77,3 +77,12 @@ pub fn spoken(sensor: Sensor) -> &'static str {
         Sensor::Accel => "accelerometer",
     }
 }
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn only_a_power_of_ten_is_written_as_one() {
+        assert_eq!(super::written("-0.2 (fixed)"), "−0.2 (fixed)");
+        assert_eq!(super::written("1.5e-7"), "1.5·10⁻⁷");
+    }
+}

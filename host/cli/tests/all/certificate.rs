@@ -169,6 +169,25 @@ fn the_same_calibration_as_found_has_not_changed_and_another_file_is_refused() {
     );
     let page = std::fs::read_to_string(at.join("page.html")).unwrap();
     assert!(page.contains("<strong>0 of "), "nothing has changed");
+    let one = std::fs::read_to_string(at.join("one.toml")).unwrap();
+    let lines = one.lines().map(|line| match line.starts_with("device = ") {
+        true => "device = \"another\"",
+        false => line,
+    });
+    std::fs::write(
+        at.join("another.toml"),
+        lines.collect::<Vec<_>>().join("\n"),
+    )
+    .unwrap();
+    let out = mimu(
+        at,
+        "report one --certificate lab.toml --as-found another.toml -o other.html",
+    );
+    let said = String::from_utf8_lossy(&out.stderr);
+    assert!(
+        said.contains("another.toml: it is of \"another\""),
+        "{said}"
+    );
     let out = mimu(
         at,
         "report one --certificate lab.toml --calibration two.toml -o other.html",

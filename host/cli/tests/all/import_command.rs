@@ -308,11 +308,9 @@ fn a_file_for_each_face_calibrates_the_accelerometer_and_says_why_there_is_no_gy
         &format!("import {faces} {columns} --reference gravity -o by_gravity"),
     );
     assert!(text.contains("six faces do not determine"), "{text}");
-    let error = refused(folder, "fit by_gravity");
-    assert!(
-        error.contains("at least 9 different poses are needed"),
-        "{error}"
-    );
+    let text = right(folder, "fit by_gravity");
+    assert!(text.contains("judgement: untested"), "{text}");
+    assert!(text.contains("angles between the axes"), "{text}");
     let error = refused(
         folder,
         &format!("import --faces x_up.csv {columns} --reference table -o bad"),

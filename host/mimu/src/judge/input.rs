@@ -36,6 +36,7 @@ pub fn of_warning(warning: &Warning) -> Option<JudgementKind> {
         | Warning::FewResiduals
         | Warning::PoorlyDetermined { .. }
         | Warning::UnseenPoses { .. }
+        | Warning::AxesOfDataSheet { .. }
         | Warning::SameRecording
         | Warning::NothingToJudge => Some(JudgementKind::Untested),
         Warning::NoBetter {

@@ -53,6 +53,8 @@ pub enum Kind {
     Step(usize),
     /// Parameters change steadily from session to session.
     Drift,
+    /// Parameters change from each session to the next, by no step.
+    Walk,
 }
 
 impl Kind {

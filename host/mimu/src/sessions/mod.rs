@@ -7,11 +7,13 @@
 //! | [`mixture`] | its intervals |
 //! | `inconsistent` | sessions that contradict themselves |
 //! | [`contradiction`] | sessions that do not belong to the others, steps and drifts |
+//! | `course` | whether parameters step, drift or wander from session to session |
 //! | `together` | biases that move together |
 
 pub mod between;
 pub mod class;
 pub mod contradiction;
+mod course;
 mod inconsistent;
 pub mod mixture;
 pub mod together;
@@ -22,6 +24,7 @@ use nalgebra::{DMatrix, DVector, SVector};
 use between::{Between, Estimates, Kinds};
 use class::PartClass;
 use contradiction::{FALSE_FINDING, Finding, Kind, Triads};
+use course::Course;
 use mixture::Matched;
 use together::Direction;
 
@@ -377,12 +380,24 @@ fn judge(data: &[Triads], count: usize) -> Judged {
         let Some(least) = least.filter(|f| f.p < FALSE_FINDING) else {
             break;
         };
+        let mut least = least;
+        if let Kind::Step(_) = least.kind {
+            least = match (course::best(&kept, &numbers, biases), &drift) {
+                (Course::Step, _) => least,
+                (Course::Slope, Some((found, _))) => found.clone(),
+                _ => Finding {
+                    kind: Kind::Walk,
+                    ..least
+                },
+            };
+        }
         findings.push(least.clone());
         match least.kind {
             // Of two nobody knows which is wrong.
             Kind::Session(_) if numbers.len() < 3 => break,
             Kind::Session(s) => used[s] = false,
             Kind::Step(first) => (0..first).for_each(|s| used[s] = false),
+            Kind::Walk => break,
             Kind::Drift => {
                 drifting = drift.map_or(drifting, |d| d.1);
                 break;

@@ -16,9 +16,12 @@ impl Sessions {
         all
     }
 
-    /// The findings that contradict the model: sessions and steps. A drift is part of the model.
+    /// The findings that contradict the model: sessions and steps. Drifts and walks are part of the model.
     pub fn contradictions(&self) -> Vec<String> {
-        let all = self.findings.iter().filter(|f| f.kind != Kind::Drift);
+        let all = self
+            .findings
+            .iter()
+            .filter(|f| !matches!(f.kind, Kind::Drift | Kind::Walk));
         let themselves = self.contradict_themselves().into_iter();
         themselves.chain(all.map(|f| self.sentence(f))).collect()
     }
@@ -84,9 +87,12 @@ impl Sessions {
                 s + 1
             ),
             Kind::Step(first) => format!(
-                "between sessions {} and {} the unit changed, as by a shock or a repair, most in the {change} ({p}); only the sessions since are used",
+                "between sessions {} and {} the unit changed, as by a shock or a repair, or is another, most in the {change} ({p}); only the sessions since are used",
                 (0..first).rfind(consistent).map_or(first, |s| s + 1),
                 first + 1
+            ),
+            Kind::Walk => format!(
+                "parameters change from each session to the next, by no step, most the {change} between the earlier and the later ones ({p}); all sessions are used"
             ),
             Kind::Drift => format!(
                 "parameters drift from session to session, most the {change} for each ({p}); the next one is extrapolated"

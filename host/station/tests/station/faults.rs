@@ -8,7 +8,7 @@ use mimu_station::limits::Limits;
 use mimu_station::quantities::measure;
 use mimu_station::scale::Scale;
 
-use super::bench::{LIMITS, RANGES, Unit, beyond, judged, up};
+use super::bench::{COUNTS, LIMITS, RANGES, Unit, beyond, judged, up};
 
 /// A unit whose readings were changed.
 fn changed(unit: &Unit, change: impl Fn(&mut Batch)) -> Samples {
@@ -134,6 +134,13 @@ fn a_unit_that_moves_is_not_measured() {
         steps: up([0.0, 0.0, 1.0], 4.0) + &up([0.0, 0.035, 1.0], 4.0),
         ..good.clone()
     };
+    // By two degrees in four seconds.
+    let creeping = changed(&good, |batch| {
+        for k in 0..batch.raw[3].len() {
+            let share = ((k as f64 - 2000.0) / 4000.0).clamp(0.0, 1.0);
+            batch.raw[3][k] += (0.035 * COUNTS[1] * share).round();
+        }
+    });
     let knocked = changed(&good, |batch| {
         for k in 4500..4700 {
             let swing = (0.1 * k as f64).sin();
@@ -144,6 +151,7 @@ fn a_unit_that_moves_is_not_measured() {
     for (name, samples) in [
         ("turned", turned.samples(7)),
         ("tilted", tilted.samples(7)),
+        ("creeping", creeping),
         ("knocked", knocked),
     ] {
         let document = judged(&samples, LIMITS);
@@ -157,6 +165,19 @@ fn a_unit_that_moves_is_not_measured() {
         assert!(problem.problem.contains("moved"), "{name}: {problem:?}");
         assert!(document.measurements.is_empty());
     }
+}
+
+#[test]
+fn a_unit_on_another_side_than_the_file_asks_for_fails_without_a_row_of_tilt() {
+    let limits = LIMITS.lines().filter(|line| !line.contains("\"tilt\""));
+    let limits = limits.collect::<Vec<_>>().join("\n");
+    assert!(limits.contains("up = \"+z\""), "{limits}");
+    let upside_down = Unit {
+        steps: up([0.0, 0.0, -1.0], 10.0),
+        ..Unit::default()
+    };
+    let document = judged(&upside_down.samples(7), &limits);
+    assert!(beyond(&document).contains(&"tilt"), "{document:?}");
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! Recordings at rest without a table: biases of the gyro, and the information that one pose gives about the accelerometer.
 
 use mimu::calibration::thermal_biases::ThermalBiases;
+use mimu::judgement::JudgementKind;
 use mimu::quantity::Sensor;
 use mimu::{Manifest, RawUnit, Reference, Samples};
 use mimu_thermal::fit::{Estimator, FitVerdict, Options, ThermalFit, fit};
@@ -45,6 +46,24 @@ pub fn in_poses(experiment: &Experiment, seed: u64, up: &[Vector3<f64>]) -> (Man
     }
     let manifest = Manifest::new("mti-g", RATE_HZ, GRAVITY, RawUnit::Volt, Reference::Gravity);
     (manifest, out)
+}
+
+#[test]
+fn the_judgement_of_counts_is_in_counts_and_names_axis_and_temperature() {
+    let (mut manifest, mut samples) = at_rest(&Experiment::ramp(60.0, true), 5);
+    manifest.raw_unit = RawUnit::Count;
+    // Millivolts as counts, as of no part, and a jump of x by 8 of them at 30 °C.
+    samples.raw.iter_mut().flatten().for_each(|v| *v *= 1e3);
+    for (x, temp_c) in samples.raw[0].iter_mut().zip(&samples.temp_c) {
+        *x += if *temp_c < 30.0 { -8.0 } else { 0.0 };
+    }
+    let found = fit(vec![session((manifest, samples)).unwrap()], &[], JOINT).unwrap();
+    let judgement = found.judgement();
+    assert_eq!(judgement.kind, JudgementKind::Unexplained, "{judgement}");
+    assert!(judgement.reason.contains(" count, "), "{judgement}");
+    let (_, place) = judgement.reason.split_once("most on x, at ").unwrap();
+    let temp_c: f64 = place.split(' ').next().unwrap().parse().unwrap();
+    assert!((temp_c - 30.0).abs() < 6.0, "{judgement}");
 }
 
 #[test]
