@@ -49,6 +49,7 @@ def read(
     separator: str | None = None,
     comment: str | None = None,
     skip_broken: int | str | bool = False,
+    trust_readings: bool = False,
     device: str | None = None,
     format: str | None = None,
     replace: bool = False,
@@ -68,7 +69,8 @@ def read(
     ``twos_complement`` are by column or sensor: ``scale={"gyro": 0.0174533}``. ``faces`` maps the axis that was up to a file:
     ``{"+x": "a.csv", "-x": "b.csv", ...}``. For a turntable with known rates, give ``rate_dps="200,270"`` and ``rate_error="0.3%"``.
     If a file has both sensors in different rows, give two lists of ``columns`` and ``where={"flag": [1, 2]}``. ``rows="..8799"`` reads these data rows
-    only. ``skip_broken=True`` leaves out up to 1 % of rows that cannot be read.
+    only. ``skip_broken=True`` leaves out up to 1 % of rows that cannot be read. ``trust_readings=True`` uses readings that look
+    like those of two devices, or wrongly coded.
 
     The recording is written to ``output``, or to a temporary folder that is removed with it. Its ``imported`` and ``warnings`` are the results
     of the import.
@@ -79,7 +81,8 @@ def read(
         reference=reference, gravity=gravity, latitude=latitude, raw_unit=raw_unit, units=units, columns=columns, preset=preset, rate_hz=rate_hz,
         time_unit=time_unit, scale=scale, offset=offset, zero=zero, twos_complement=twos_complement, signed_low_byte=signed_low_byte,
         where=where, rows=rows, topic=topic, instance=instance, means=means, sequence=sequence, faces=bool(faces), step_gap=step_gap, inputs=inputs,
-        rate_dps=rate_dps, rate_error=rate_error, separator=separator, comment=comment, skip_broken=skip_broken, device=device, format=format, replace=replace,
+        rate_dps=rate_dps, rate_error=rate_error, separator=separator, comment=comment, skip_broken=skip_broken, trust_readings=trust_readings,
+        device=device, format=format, replace=replace,
     )
     named = [f"{face}={os.fspath(file)}" for face, file in (faces or {}).items()]
     # After `--`, a name that begins with a hyphen is a name.

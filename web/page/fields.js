@@ -23,7 +23,7 @@ const TO_SI = {
 export const FIELD_OF = {
   "--columns": "files", "--rate-hz": "rate", "--time-unit": "time-unit", "--gravity": "gravity", "--latitude": "latitude", "--topic": "topic",
   "--raw-unit": "accel-unit", "--reference": "reference", "--skip-broken": "broken", "--instance": "instance", "--device": "unit-name", "--where": "more-import",
-  "--scale": "more-import", "--offset": "more-import", "--signed-low-byte": "more-import", "--preset": "more-import", "--still": "more-fit",
+  "--scale": "more-import", "--offset": "more-import", "--signed-low-byte": "more-import", "--trust-readings": "more-import", "--preset": "more-import", "--still": "more-fit",
   "--steps": "more-fit", "--only": "more-fit", "--keep": "more-fit",
 };
 

@@ -8,7 +8,7 @@ use mimu_thermal::warning::Warning as OverTemperature;
 use mimu_wizard::waiting::Waiting;
 
 /// Flags of the import. They are a remedy after any command that reads a recording; other flags only after the command that refused.
-const OF_THE_IMPORT: [&str; 18] = [
+const OF_THE_IMPORT: [&str; 19] = [
     "--columns",
     "--rate-hz",
     "--time-unit",
@@ -27,6 +27,7 @@ const OF_THE_IMPORT: [&str; 18] = [
     "--means",
     "--skip-broken",
     "--signed-low-byte",
+    "--trust-readings",
 ];
 
 /// The error in one line, with the flags of `command` that can remedy it. Several commands can cause the same refusal, and a flag that the present
@@ -133,6 +134,7 @@ fn flag(argument: Argument) -> Option<&'static str> {
         Argument::Preset => "--preset",
         Argument::Means => "--means",
         Argument::SkipBroken => "--skip-broken",
+        Argument::TrustReadings => "--trust-readings",
         Argument::SignedLowByte => "--signed-low-byte",
         Argument::Accept => "--accept",
         Argument::Force => "--force",

@@ -146,6 +146,9 @@ pub(crate) struct ImportArgs {
     /// Leave out rows that cannot be read: at most this number (`=20`), or this share of each file (`=2%`) [without a value: 1%]
     #[arg(long, value_name = "LIMIT", num_args = 0..=1, require_equals = true, default_missing_value = "1%", conflicts_with = "means")]
     skip_broken: Option<BrokenLimit>,
+    /// Use the readings although they look like those of two devices in turn, wrongly coded, or of another range from some row on
+    #[arg(long, conflicts_with = "means")]
+    trust_readings: bool,
     /// Format of the samples: parquet or csv
     #[arg(long, default_value = "parquet")]
     format: SampleFormat,
@@ -256,7 +259,12 @@ fn ask(args: &mut ImportArgs, look: &Look) -> Result<bool> {
                 let refused = |_| Error::new("--rate-hz", problem, "write samples a second");
                 args.rate_hz = Some(number.map_err(refused)?);
             }
-            "--columns" => args.columns.push(answer.parse()?),
+            "--columns" => {
+                args.columns.push(answer.parse()?);
+                let separator = look.files.iter().find_map(|file| file.separator);
+                args.separator = args.separator.or(separator);
+            }
+            "--time-unit" => args.time_unit = Some(answer.parse()?),
             _ => return Ok(false),
         }
     }
@@ -450,6 +458,7 @@ pub(crate) fn imported(mut args: ImportArgs) -> Result<ImportSummary> {
         filters: args.filters,
         rows: args.rows,
         skip_broken: args.skip_broken.unwrap_or_default(),
+        trust_readings: args.trust_readings,
         format: args.format,
         replace: args.replace,
         ..ImportOptions::new(files, gravity, raw_unit, reference)

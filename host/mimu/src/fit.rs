@@ -234,10 +234,16 @@ fn fit_as_prepared(mut prepared: Prepared, options: Options) -> Result<Fit> {
         )
         .about(Argument::Only));
     }
-    if let Some(fault) = &prepared.dwells.fault {
+    let mut suspicions = Vec::new();
+    if prepared.manifest.trusts_readings() {
+        let found = prepared.dwells.fault.iter();
+        let found = found.chain(&prepared.condensed.signed_low_byte);
+        suspicions.extend(found.copied().map(Warning::Health));
+    } else if let Some(fault) = &prepared.dwells.fault {
         return Err(fault.refusal(&prepared.place));
+    } else {
+        plausible::check_readings(&prepared)?;
     }
-    plausible::check_readings(&prepared)?;
     reference_error::refuse_unused(&prepared, options.method)?;
     let mut with_all = PerSensor::default();
     if prepared.manifest.reference == Reference::Gravity {
@@ -251,6 +257,7 @@ fn fit_as_prepared(mut prepared: Prepared, options: Options) -> Result<Fit> {
     };
     let at_none = rated.as_ref().and_then(|r| r.exclude_dwells(&mut prepared));
     let mut warnings = prepared.condensed.warnings.clone();
+    warnings.extend(suspicions);
     warnings.extend(prepared.dwells.warnings.iter().cloned());
     warnings.extend(prepared.implausible_rate());
     warnings.extend(without_temperature(&prepared));

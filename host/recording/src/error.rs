@@ -102,6 +102,8 @@ pub enum Argument {
     Means,
     /// How many rows that cannot be read are left out.
     SkipBroken,
+    /// Whether readings that look wrong are used.
+    TrustReadings,
     /// Columns whose low byte a firmware took for a signed number.
     SignedLowByte,
     /// Products that are accepted on the evidence of one recording.

@@ -184,6 +184,9 @@ pub struct Source {
     pub sha256: String,
 }
 
+/// Option of an import that uses readings although they look wrong.
+pub(crate) const TRUST_READINGS: &str = "--trust-readings";
+
 /// Contents of `recording.toml`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -280,6 +283,11 @@ impl Manifest {
     pub fn has_rate_of_stamps(&self) -> bool {
         let given = self.imported_with.iter().any(|a| a == "--rate-hz");
         !self.imported_with.is_empty() && !given
+    }
+
+    /// Whether readings that look wrong are used, because a person said that they are right.
+    pub fn trusts_readings(&self) -> bool {
+        self.imported_with.iter().any(|a| a == TRUST_READINGS)
     }
 
     /// Whether it was joined from files that follow one another, one step each.

@@ -226,19 +226,29 @@ impl Finding {
             Some(about) => format!("{place}, column {about}"),
             None => place.to_string(),
         };
-        let error = Error::new(place, self.problem(), self.remedy());
+        let mut remedy = self.remedy();
+        if self.is_suspicion() {
+            remedy += "; if the readings are right, say so";
+        }
+        let error = Error::new(place, self.problem(), remedy);
         let settings = self.settings().iter();
         settings.fold(error, |error, setting| error.about(*setting))
     }
 
+    /// Whether sound readings may look like this too, so that only a person can say whether it is a fault.
+    pub fn is_suspicion(&self) -> bool {
+        self.settings().contains(&Argument::TrustReadings)
+    }
+
     /// Settings of an import that its remedy is about.
     fn settings(&self) -> &'static [Argument] {
+        use Argument::{Columns, Rows, TrustReadings, TwosComplement, Where};
         match self.fault {
-            Fault::AllZero => &[Argument::Columns],
-            Fault::Alternating { .. } => &[Argument::Where, Argument::Columns],
-            Fault::Unsigned => &[Argument::TwosComplement],
-            Fault::RangeChanged { .. } | Fault::ColumnsMoved { .. } => &[Argument::Rows],
-            Fault::SignedLowByte => &[Argument::SignedLowByte],
+            Fault::AllZero => &[Columns],
+            Fault::Alternating { .. } => &[Where, Columns, TrustReadings],
+            Fault::Unsigned => &[TwosComplement, TrustReadings],
+            Fault::RangeChanged { .. } | Fault::ColumnsMoved { .. } => &[Rows, TrustReadings],
+            Fault::SignedLowByte => &[Argument::SignedLowByte, TrustReadings],
             Fault::NoTemperatures { .. } => &[Argument::Scale, Argument::Offset],
             _ => &[],
         }

@@ -11,6 +11,8 @@ const LEAP: f64 = 8.0;
 const BACK: f64 = 4.0;
 /// Least share of rows that jump away and back. If two sources alternate at random, one row in four does.
 const LEAPING: f64 = 0.1;
+/// Share of the jumps of a channel in whose rows another one jumps too. Two coarse channels of one device share a quarter at most.
+const TOGETHER: f64 = 0.5;
 /// Fewest rows from which this is concluded.
 const FEWEST: usize = 100;
 
@@ -69,8 +71,9 @@ impl TwoSources {
 
     /// Findings about the channels: readings of two sources that alternate, or that jump between the ends of 16 bits.
     pub fn channels(&self) -> Vec<Finding> {
+        let leaps = std::array::from_fn(|c| leaps(&self.first[c]));
         let each = self.first.iter().enumerate();
-        let each = each.flat_map(|(c, first)| [across_16_bits(c, first), leaping(c, first)]);
+        let each = each.flat_map(|(c, first)| [across_16_bits(c, first), alternating(c, &leaps)]);
         each.flatten().collect()
     }
 
@@ -139,29 +142,41 @@ fn class(magnitude: f32) -> Option<usize> {
     octaves.is_finite().then_some(within)
 }
 
-/// The finding that the first `readings` of channel `c` jump away and back, if a large share does.
-fn leaping(c: usize, readings: &[f64]) -> Option<Finding> {
-    let mut over_two: Vec<f64> = readings
-        .windows(3)
-        .map(|w| (w[2] - w[0]).abs())
-        .filter(|change| change.is_finite())
-        .collect();
-    if over_two.len() < FEWEST {
-        return None;
+/// The finding that channel `c` jumps away and back, if a large share of its rows does, and another channel jumps in the same rows: a row of another
+/// device or unit has other readings in all channels. A single device with coarse readings also jumps by a whole step and back, but each channel by
+/// itself.
+fn alternating(c: usize, leaps: &[Vec<bool>; 6]) -> Option<Finding> {
+    let count = |rows: &[bool]| rows.iter().filter(|leap| **leap).count();
+    let share = |c: usize| count(&leaps[c]) as f64 / leaps[c].len().max(1) as f64;
+    let in_the_same_rows = |other: usize| {
+        let both = leaps[c].iter().zip(&leaps[other]);
+        let both = both.filter(|(a, b)| **a && **b).count();
+        both as f64 >= TOGETHER * count(&leaps[c]).min(count(&leaps[other])) as f64
+    };
+    let mut others = (0..6).filter(|other| *other != c && share(*other) >= LEAPING);
+    let share = share(c);
+    (share >= LEAPING && others.any(in_the_same_rows)).then(|| {
+        let rows = count(&leaps[c]) as u64;
+        Finding::new(RAW_COLUMNS[c], rows, Fault::Alternating { share })
+    })
+}
+
+/// Which of the first `readings` jump away from the reading before and back; none if there are too few.
+fn leaps(readings: &[f64]) -> Vec<bool> {
+    let over_two = readings.windows(3).map(|w| (w[2] - w[0]).abs());
+    let mut changes: Vec<f64> = over_two.filter(|change| change.is_finite()).collect();
+    if changes.len() < FEWEST {
+        return Vec::new();
     }
-    let at = over_two.len() / 4;
+    let at = changes.len() / 4;
     // The lower quartile, because half of all pairs come from one source if two sources alternate at random.
-    let quarter = *over_two.select_nth_unstable_by(at, f64::total_cmp).1;
-    let nonzero = over_two.iter().copied().filter(|change| *change > 0.0);
-    let step = nonzero.fold(f64::INFINITY, f64::min);
-    let unit = (2.0 * quarter).max(step);
-    let leaps = readings.windows(3).filter(|w| {
+    let quarter = *changes.select_nth_unstable_by(at, f64::total_cmp).1;
+    let nonzero = changes.iter().copied().filter(|change| *change > 0.0);
+    let unit = (2.0 * quarter).max(nonzero.fold(f64::INFINITY, f64::min));
+    let leap = |w: &[f64]| {
         (w[1] - w[0]).abs() > LEAP * unit
             && (w[1] - w[2]).abs() > LEAP * unit
             && (w[2] - w[0]).abs() <= BACK * unit
-    });
-    let leaps = leaps.count();
-    let share = leaps as f64 / over_two.len() as f64;
-    let fault = Fault::Alternating { share };
-    (share >= LEAPING).then(|| Finding::new(RAW_COLUMNS[c], leaps as u64, fault))
+    };
+    readings.windows(3).map(leap).collect()
 }

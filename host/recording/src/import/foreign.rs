@@ -47,6 +47,8 @@ pub(super) struct HowToRead<'a> {
     pub time_unit: Option<Decimal>,
     /// How many broken rows may be left out.
     pub skip_broken: BrokenLimit,
+    /// Whether readings that look wrong are used.
+    pub trust_readings: bool,
     /// Whether a thermometer's cell with a zero is empty.
     pub empty_zero_temperatures: bool,
     /// Whether rows without a reading belong to another source of the same file.
@@ -222,7 +224,7 @@ impl ForeignFile {
         let values: Vec<Cell> = numbers.collect();
         Ok(ForeignFile {
             path: path.to_owned(),
-            seen: Plausibility::new(values.iter().map(|cell| cell.column)),
+            seen: Plausibility::new(values.iter().map(|cell| cell.column), how.trust_readings),
             values,
             empty_zero_temperatures: how.empty_zero_temperatures,
             skip_empty: how.skip_empty,

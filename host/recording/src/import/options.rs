@@ -15,7 +15,7 @@ use super::row_range::RowRange;
 use super::time::Decimal;
 use crate::digest;
 use crate::error::{Argument, Error, Result};
-use crate::manifest::{RawUnit, Reference, Source, check_gravity, check_rate};
+use crate::manifest::{RawUnit, Reference, Source, TRUST_READINGS, check_gravity, check_rate};
 use crate::separator::Separator;
 use crate::signed_low_byte::SignedLowByte;
 use crate::turntable::Turntable;
@@ -79,6 +79,8 @@ pub struct ImportOptions {
     pub rows: Option<RowRange>,
     /// How many rows that cannot be read may be left out.
     pub skip_broken: BrokenLimit,
+    /// Whether readings are used although they look like those of two devices, or wrongly coded.
+    pub trust_readings: bool,
     /// Whether each row is the mean over a pose or a step instead of a sample.
     pub means: bool,
     /// The preset that was used; see [`ImportOptions::with_preset`].
@@ -126,6 +128,7 @@ impl ImportOptions {
             filters: Vec::new(),
             rows: None,
             skip_broken: BrokenLimit::None,
+            trust_readings: false,
             means: false,
             preset: None,
             preset_warnings: Vec::new(),
@@ -312,6 +315,9 @@ impl ImportOptions {
         if self.skip_broken != BrokenLimit::None {
             arguments.push(format!("--skip-broken={}", self.skip_broken));
         }
+        if self.trust_readings {
+            arguments.push(TRUST_READINGS.to_owned());
+        }
         let mut option = |name: &str, value: String| arguments.extend([name.to_owned(), value]);
         if let Some(gap) = self.step_gap_s {
             option("--step-gap", gap.to_string());
@@ -423,6 +429,7 @@ impl ImportOptions {
             rate_hz: self.rate_hz,
             time_unit: self.time_unit,
             skip_broken: self.skip_broken,
+            trust_readings: self.trust_readings,
             empty_zero_temperatures: false,
             skip_empty: self.has_one_file_for_all(),
         }

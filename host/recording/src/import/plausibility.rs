@@ -19,11 +19,13 @@ pub(super) struct Plausibility {
     held: [HeldReadings; 2],
     two_sources: TwoSources,
     temperatures: Temperatures,
+    /// Whether what the readings look like gives a warning instead of a refusal.
+    trusted: bool,
 }
 
 impl Plausibility {
     /// For a file with these columns.
-    pub fn new(columns: impl Iterator<Item = Column>) -> Self {
+    pub fn new(columns: impl Iterator<Item = Column>, trusted: bool) -> Self {
         let (mut places, mut temperature) = ([None; 6], None);
         for (place, column) in columns.enumerate() {
             match column {
@@ -40,6 +42,7 @@ impl Plausibility {
             held: Default::default(),
             two_sources: TwoSources::default(),
             temperatures: Temperatures::default(),
+            trusted,
         }
     }
 
@@ -105,7 +108,7 @@ impl Plausibility {
         let channels = self.two_sources.channels();
         let refused = channels
             .into_iter()
-            .find(|found| found.fault != Fault::Overflow);
+            .find(|found| found.is_suspicion() && !self.trusted);
         let nothing = self.zeros.nothing();
         let found = nothing
             .or(refused)
@@ -125,7 +128,7 @@ impl Plausibility {
         let mut all: Vec<Finding> = held.collect();
         all.extend(self.two_sources.two_magnitudes());
         let channels = self.two_sources.channels().into_iter();
-        all.extend(channels.filter(|found| found.fault == Fault::Overflow));
+        all.extend(channels.filter(|found| self.trusted || !found.is_suspicion()));
         all.extend(self.zeros.found());
         let temperatures = &self.temperatures;
         all.extend(temperatures.impossible());

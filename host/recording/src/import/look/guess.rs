@@ -5,7 +5,9 @@
 
 use serde::Serialize;
 
-use super::names::{Meaning, clock_unit, force_unit, meaning, rate_unit};
+use super::names::{
+    Meaning, clock_unit, clock_unit_within, force_unit, is_other, meaning, rate_unit,
+};
 use crate::RAW_COLUMNS;
 use crate::import::time::Decimal;
 use crate::units::{Series, UnitFound, accel_unit, gyro_unit};
@@ -23,6 +25,9 @@ pub struct Guess {
     pub time_unit: Option<Decimal>,
     /// Whether the roles follow from the readings alone.
     pub by_readings: bool,
+    /// Whether a column was taken for the time because it grows evenly, under whatever name.
+    #[serde(skip)]
+    pub grows: bool,
     /// Whether the times are dates or times of day.
     #[serde(skip)]
     pub calendar: bool,
@@ -38,6 +43,10 @@ pub fn guess(file: &str, names: &[String], units: &[String], rows: &[Vec<f64>]) 
         true => by_readings(file, width, rows),
         false => by_names(file, names),
     };
+    let time = ["t_s", "sample"];
+    if !guess.roles.iter().any(|role| time.contains(role)) {
+        take_growing(&mut guess, names, rows);
+    }
     // Codes of a thermometer are not in °C, and are worse than no temperature.
     let implausible = |at: usize| {
         let values = rows.iter().filter_map(|row| row.get(at));
@@ -65,6 +74,9 @@ pub fn guess(file: &str, names: &[String], units: &[String], rows: &[Vec<f64>]) 
     guess.gyro_unit = alike(&said(&GYRO), rate_unit);
     guess.accel_unit = alike(&said(&ACCEL), force_unit);
     guess.time_unit = alike(&said(&["t_s"]), clock_unit);
+    if guess.grows && guess.time_unit.is_none() {
+        guess.time_unit = alike(&said(&["t_s"]), clock_unit_within);
+    }
     guess
 }
 
@@ -127,6 +139,33 @@ fn by_names(file: &str, names: &[String]) -> Guess {
         roles,
         ..Guess::default()
     }
+}
+
+/// Takes the first column for the time if it grows evenly and its name means nothing else.
+fn take_growing(guess: &mut Guess, names: &[String], rows: &[Vec<f64>]) {
+    let first = names.iter().position(|name| !name.is_empty());
+    let Some(at) = first.filter(|at| guess.roles[*at] == "-" && !is_other(&names[*at])) else {
+        return;
+    };
+    if grows_evenly(rows, at) {
+        guess.roles[at] = "t_s";
+        guess.grows = true;
+    }
+}
+
+/// Whether the cells at `at` grow in every row, most of them by about the same step.
+pub(super) fn grows_evenly(rows: &[Vec<f64>], at: usize) -> bool {
+    let cell = |row: &Vec<f64>| row.get(at).copied().unwrap_or(f64::NAN);
+    let mut steps: Vec<f64> = rows.windows(2).map(|w| cell(&w[1]) - cell(&w[0])).collect();
+    if steps.len() < 2 || !steps.iter().all(|step| *step > 0.0) {
+        return false;
+    }
+    steps.sort_by(f64::total_cmp);
+    let usual = steps[steps.len() / 2];
+    let near = steps
+        .iter()
+        .filter(|s| (0.5 * usual..=2.0 * usual).contains(*s));
+    5 * near.count() >= 4 * steps.len()
 }
 
 /// Columns beyond which a file without names is no log of samples: a row is then a whole recording, or many sensors.

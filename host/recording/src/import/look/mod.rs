@@ -11,12 +11,13 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
+use self::guess::grows_evenly;
 pub use guess::{Guess, Units, guess};
 
-use self::names::{Meaning, meaning, unknown_axis};
+use self::names::{Meaning, meaning, unknown_triad};
 use super::assignment::{ColumnList, Role, Scale};
 use super::preview::preview;
-use super::time::{Decimal, calendar_time};
+use super::time::{Decimal, Seen, Unit, calendar_time};
 use crate::error::{Error, Result};
 use crate::separator::Separator;
 use crate::units::UnitFound;
@@ -47,6 +48,52 @@ pub struct FileLook {
     pub guess: Guess,
     /// The separator, if an import would not recognise it.
     pub separator: Option<Separator>,
+}
+
+impl FileLook {
+    /// See [`Look::columns_to_complete`]; `counts` are the known axes of gyro and accelerometer.
+    fn columns_to_complete(&self, counts: [usize; 2]) -> String {
+        let roles = &self.guess.roles;
+        let used = (0..self.names.len().min(roles.len())).filter(|k| roles[*k] != "-");
+        let distinct = |k: usize| {
+            let name = &self.names[k];
+            let again = self.names.iter().filter(|other| *other == name).count();
+            again == 1 && !name.is_empty() && !name.contains([',', '=', '\''])
+        };
+        if self.names.is_empty() || self.separator.is_some() || !used.clone().all(distinct) {
+            let separator = self
+                .separator
+                .map(|separator| format!(" --separator '{separator}'"));
+            return format!(
+                "--columns {}{}",
+                roles.join(","),
+                separator.unwrap_or_default()
+            );
+        }
+        let mut items: Vec<String> = used
+            .map(|k| format!("{}={}", roles[k], self.names[k]))
+            .collect();
+        if counts == [0; 2] && !roles.contains(&"t_s") {
+            items.insert(0, "t_s=NAME".into());
+        }
+        let triad = unknown_triad(&self.names).map(|(triad, _)| triad);
+        for (sensor, count) in ["gyro", "accel"].into_iter().zip(counts) {
+            let asked = counts == [0; 2] || matches!(count, 1 | 2) || count == 0 && triad.is_some();
+            for (k, axis) in ["x", "y", "z"].iter().enumerate().filter(|_| asked) {
+                let role = format!("{sensor}_{axis}");
+                if !roles.contains(&role.as_str()) {
+                    let name = triad.map_or("NAME", |triad| &self.names[triad[k]]);
+                    items.push(format!("{role}={name}"));
+                }
+            }
+        }
+        let list = items.join(",");
+        let plain = |c: char| c.is_alphanumeric() || "_.,=-".contains(c);
+        match list.chars().all(plain) {
+            true => format!("--columns {list}"),
+            false => format!("--columns '{list}'"),
+        }
+    }
 }
 
 /// What a person has to say, with the options that say it.
@@ -268,7 +315,7 @@ impl Look {
             .flat_map(|look| look.names.clone())
             .filter(|name| !name.is_empty())
             .collect();
-        let list = "--columns t_s=NAME,gyro_x=NAME,gyro_y=NAME,gyro_z=NAME,accel_x=NAME,accel_y=NAME,accel_z=NAME";
+        let list = &self.columns_to_complete();
         if gyro + accel == 0 {
             let about = match names.is_empty() {
                 true => "no columns are known to be a gyro or an accelerometer".into(),
@@ -317,17 +364,56 @@ impl Look {
                 let about =
                     "the file has no names, and the readings do not show which triad feels gravity"
                         .into();
-                self.ask(
-                    about,
-                    "--columns t_s,accel_x,accel_y,accel_z,gyro_x,gyro_y,gyro_z",
-                );
+                self.ask(about, list);
             }
         }
         let timed = has("t_s");
         if !timed && !given.rate {
-            self.ask("no column is a time".into(), "--rate-hz RATE");
+            self.ask_for_time(numbers, list);
         } else if timed && !given.rate && given.time_unit.is_none() && self.time_unit().is_none() {
             self.check_clock(numbers);
+        }
+    }
+
+    /// The columns as options, with what is known of them: by name where the names are distinct, else from the left.
+    fn columns_to_complete(&self) -> String {
+        let roles = self.files.iter().flat_map(|look| &look.guess.roles);
+        let count = |sensor: &str| {
+            roles
+                .clone()
+                .filter(|role| role.starts_with(sensor))
+                .count()
+        };
+        let counts = [count("gyro_"), count("accel_")];
+        let lists = self
+            .files
+            .iter()
+            .map(|look| look.columns_to_complete(counts));
+        lists.collect::<Vec<String>>().join(" ")
+    }
+
+    /// Asks for the rate, or whether a column that grows is the time.
+    fn ask_for_time(&mut self, numbers: &[Vec<Vec<f64>>], list: &str) {
+        let (look, rows) = (&self.files[0], &numbers[0]);
+        let judged = &rows[..rows.len().min(JUDGED)];
+        let width = judged.first().map_or(0, Vec::len);
+        let unused = |at: &usize| look.guess.roles.get(*at) == Some(&"-");
+        let growing = (0..width)
+            .filter(unused)
+            .find(|at| grows_evenly(judged, *at));
+        let name = growing.and_then(|at| look.names.get(at));
+        match name.filter(|name| !name.is_empty()) {
+            Some(name) => {
+                let about = format!(
+                    "no column is known to be a time; {name:?} grows evenly, and may be one"
+                );
+                let answer = match list.split_once('=') {
+                    Some(_) => list.replacen("--columns ", &format!("--columns t_s={name},"), 1),
+                    None => "--rate-hz RATE".into(),
+                };
+                self.ask(about, &answer);
+            }
+            None => self.ask("no column is a time".into(), "--rate-hz RATE"),
         }
     }
 
@@ -347,21 +433,15 @@ impl Look {
                     names[k]
                 ));
             }
-            let mut unknown: Vec<(usize, String)> =
-                names.iter().filter_map(|n| unknown_axis(n)).collect();
-            unknown.sort_by(|a, b| a.1.cmp(&b.1));
-            let triad = unknown
-                .chunk_by(|a, b| a.1 == b.1)
-                .find(|all| (0..3).all(|axis| all.iter().any(|(a, _)| *a == axis)));
             let missing = match [gyro, accel] {
                 [0, 3] => Some("the gyro"),
                 [3, 0] => Some("the accelerometer"),
                 _ => None,
             };
-            if let (Some(triad), Some(missing)) = (triad, missing) {
+            if let (Some((triad, _)), Some(missing)) = (unknown_triad(names), missing) {
                 asked.push(format!(
-                    "the columns of {:?} may be {missing}, which is not among the others",
-                    triad[0].1
+                    "the columns {} may be {missing}, which is not among the others",
+                    triad.map(|at| names[at].as_str()).join(", ")
                 ));
             }
         }
@@ -389,17 +469,23 @@ impl Look {
             .iter()
             .position(|role| *role == "t_s")
             .unwrap_or(0);
+        let name = look.names.get(at).cloned().unwrap_or_default();
         let times: Vec<f64> = rows.iter().filter_map(|row| row.get(at).copied()).collect();
         // One by one: a counter, whose rate nobody knows.
         let counts = times.len() > 2 && times.windows(2).all(|w| w[1] - w[0] == 1.0);
         if counts {
-            let name = look.names.get(at).cloned().unwrap_or_default();
             let about = format!("the column {name:?} counts the rows one by one, which is no time");
             let roles = &mut self.files[0].guess.roles;
             if let Some(role) = roles.iter_mut().find(|role| **role == "t_s") {
                 *role = "sample";
             }
             self.ask(about, "--rate-hz RATE");
+        } else if look.guess.grows
+            && let Err([fine, coarse]) = Unit::recognise(&Seen::of(&times))
+        {
+            let about =
+                format!("the column {name:?} grows evenly, as a time in {fine} or {coarse}");
+            self.ask(about, &format!("--time-unit {}", fine.symbol()));
         }
     }
 
@@ -518,6 +604,10 @@ impl Look {
                 ),
             };
             lines.push(format!("{place}{}", used.join(", ")));
+            let time = look.guess.roles.iter().position(|role| *role == "t_s");
+            if let Some(at) = time.filter(|_| look.guess.grows) {
+                lines.push(format!("{place}{} grows evenly, so it is the time", of(at)));
+            }
             if !left.is_empty() && look.separator.is_none() {
                 lines.push(format!("{place}left out: {}", few(&left)));
             }

@@ -324,8 +324,9 @@ fn axis_of(words: &[String]) -> Option<(usize, String)> {
 fn essential(mut words: Vec<String>) -> Vec<String> {
     let unit = |w: &str| {
         [
-            "dps", "rad", "deg", "rads", "degs", "mps", "mps2", "ms2", "mg", "mss", "raw", "imu",
-            "sensor", "body", "b", "data", "value", "val", "field", "msg",
+            "dps", "mdps", "rad", "mrad", "deg", "rads", "degs", "radps", "degps", "rps", "mps",
+            "mps2", "ms2", "mg", "gs", "mss", "raw", "imu", "sensor", "body", "b", "data", "value",
+            "val", "field", "msg",
         ]
         .contains(&w)
     };
@@ -372,6 +373,17 @@ pub(super) fn meaning(name: &str) -> Meaning {
                 .position(|a| *a == whole)
                 .unwrap_or(0),
         );
+    }
+    if let Some(axis) = rate_of_an_angle(&essential) {
+        return Meaning::Gyro(axis);
+    }
+    // `ax_g`, but `g_x` and `x_g` may be those of a gyro.
+    if let [of @ .., unit] = &essential[..]
+        && unit == "g"
+        && let Some((axis, stem)) = axis_of(of)
+        && one_of(&ACCEL, &stem)
+    {
+        return Meaning::Accel(axis);
     }
     if let Some((axis, stem)) = axis_of(&essential) {
         if stem.is_empty() {
@@ -424,13 +436,55 @@ pub(super) fn meaning(name: &str) -> Meaning {
     }
 }
 
-/// The axis that `name` seems to be of a sensor that is not known, and the sensor's word: `foo_x`.
-pub(super) fn unknown_axis(name: &str) -> Option<(usize, String)> {
-    let essential = essential(words(&without_unit(name.trim())));
-    let (axis, stem) = axis_of(&essential)?;
-    // A letter is a part of a quaternion, or of anything.
-    let known = stem.len() < 2 || OTHER.iter().any(|word| stem.contains(word));
-    (!known && meaning(name) == Meaning::Other).then_some((axis, stem))
+/// The axis of a rate that is named after its angle: `roll_rate`, MAVLink's `pitchspeed`.
+fn rate_of_an_angle(words: &[String]) -> Option<usize> {
+    const RATE: [&str; 8] = [
+        "rate",
+        "rates",
+        "speed",
+        "dot",
+        "vel",
+        "velocity",
+        "angularrate",
+        "gyro",
+    ];
+    let joined = words.concat();
+    let rest = |angle: &&str| joined.strip_prefix(*angle).or(joined.strip_suffix(*angle));
+    let is_rate = |angle: &&str| rest(angle).is_some_and(|rest| RATE.contains(&rest));
+    ["roll", "pitch", "yaw"]
+        .iter()
+        .position(|angle| is_rate(&angle))
+}
+
+/// Letters before an axis that mean no inertial sensor: magnetometer, quaternion, velocity, position, attitude, field.
+const OTHER_LETTERS: [&str; 9] = ["m", "q", "v", "p", "h", "b", "e", "u", "n"];
+
+/// Three of `names` that differ in nothing but x, y and z, and mean nothing that is known: where they are, and what they have in common.
+pub(super) fn unknown_triad(names: &[String]) -> Option<([usize; 3], String)> {
+    let lower: Vec<String> = names.iter().map(|name| name.to_lowercase()).collect();
+    for (first, name) in lower.iter().enumerate() {
+        for (at, _) in name.match_indices('x') {
+            let (before, behind) = (&name[..at], &name[at + 1..]);
+            let on = |axis: char| {
+                let other = format!("{before}{axis}{behind}");
+                lower.iter().position(|name| *name == other)
+            };
+            let letter = |c: &char| c.is_alphabetic();
+            let stem: String = before
+                .chars()
+                .chain(behind.chars())
+                .filter(letter)
+                .collect();
+            let known = stem.is_empty()
+                || OTHER_LETTERS.contains(&stem.as_str())
+                || is_other(&stem)
+                || meaning(&names[first]) != Meaning::Other;
+            if let (false, Some(y), Some(z)) = (known, on('y'), on('z')) {
+                return Some(([first, y, z], stem));
+            }
+        }
+    }
+    None
 }
 
 /// `t_ms`, `ts [us]`: a letter or two with a unit of time.
@@ -562,6 +616,27 @@ pub(super) fn force_unit(text: &str) -> Option<&'static str> {
     of(text, &FORCES).or_else(|| text.contains(ROS[1]).then_some("m/s²"))
 }
 
+/// The unit of time stamps whose name is one word with its unit: `ustime`, `tms`, `msecs`.
+pub(super) fn clock_unit_within(name: &str) -> Option<Decimal> {
+    let word = words(name).concat();
+    let within = |spelling: &&str| {
+        let rest = word
+            .strip_prefix(*spelling)
+            .or(word.strip_suffix(*spelling));
+        rest.is_some_and(|rest| ["t", "s"].contains(&rest) || TIME.contains(&rest))
+    };
+    // A lone s may be the end of any word.
+    let finer = CLOCKS.iter().filter(|(unit, _)| *unit != Decimal::Second);
+    let mut found = finer.filter(|(_, spellings)| spellings.iter().any(|s| within(&s)));
+    found.next().map(|(unit, _)| *unit)
+}
+
+/// Whether `name` contains a word of something that is neither a time nor an inertial sensor.
+pub(super) fn is_other(name: &str) -> bool {
+    let name = name.to_lowercase();
+    OTHER.iter().any(|word| name.contains(word))
+}
+
 /// The unit of time stamps.
 pub(super) fn clock_unit(text: &str) -> Option<Decimal> {
     let joined = words(text);
@@ -627,6 +702,14 @@ mod tests {
             ("w_RS_S_x [rad s^-1]", Meaning::Gyro(0)),
             ("a_RS_S_z [m s^-2]", Meaning::Accel(2)),
             ("sensor_accel.x", Meaning::Accel(0)),
+            ("ax_g", Meaning::Accel(0)),
+            ("accZ_g", Meaning::Accel(2)),
+            ("Ay_mg", Meaning::Accel(1)),
+            ("Gz_mdps", Meaning::Gyro(2)),
+            ("gx_rps", Meaning::Gyro(0)),
+            ("roll_rate", Meaning::Gyro(0)),
+            ("pitchspeed", Meaning::Gyro(1)),
+            ("YawRate (deg/s)", Meaning::Gyro(2)),
         ] {
             assert_eq!(meaning(name), wanted, "{name}: {:?}", words(name));
         }
@@ -663,6 +746,7 @@ mod tests {
             ("mag_x", Meaning::Other),
             ("qw", Meaning::Other),
             ("roll", Meaning::Other),
+            ("roll_rate_setpoint", Meaning::Other),
             ("Mx", Meaning::Other),
             ("orientation.x", Meaning::Other),
             ("userAcceleration.x", Meaning::Other),
@@ -682,10 +766,25 @@ mod tests {
 
     #[test]
     fn a_triad_of_an_unknown_word_is_noticed() {
-        assert_eq!(unknown_axis("foo_x"), Some((0, "foo".into())));
-        for name in ["x", "gyro_x", "mag_y", "Mx", "q_z", "orientation.x", "temp"] {
-            assert_eq!(unknown_axis(name), None, "{name}");
+        let triad = |name: &str| {
+            let names = ["x", "z", "y"].map(|axis| name.replace('*', axis));
+            unknown_triad(&names)
+        };
+        for (name, stem) in [("foo_*", "foo"), ("R*", "r"), ("g*_foo", "gfoo")] {
+            assert_eq!(triad(name), Some(([0, 2, 1], stem.into())), "{name}");
         }
+        for name in [
+            "*",
+            "gyro_*",
+            "mag_*",
+            "M*",
+            "q_*",
+            "orientation.*",
+            "g*_dps",
+        ] {
+            assert_eq!(triad(name), None, "{name}");
+        }
+        assert_eq!(unknown_triad(&["foo_x".into(), "foo_y".into()]), None);
     }
 
     #[test]

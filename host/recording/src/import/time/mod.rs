@@ -18,5 +18,5 @@ pub use stamp::Decimal;
 pub(super) use calendar::parse as calendar_time;
 pub(super) use clock::{Clock, Known, Times};
 pub(super) use polled::LONGEST;
-pub(super) use stamp::Stamp;
+pub(super) use stamp::{Seen, Stamp, Unit};
 pub(super) use stamps::Stamps;

@@ -239,6 +239,23 @@ pub(in super::super) struct Seen<'a> {
     pub name: Option<&'a str>,
 }
 
+impl Seen<'_> {
+    /// What stamps show by themselves.
+    pub fn of(stamps: &[f64]) -> Self {
+        let mut steps: Vec<f64> = stamps.windows(2).map(|w| w[1] - w[0]).collect();
+        let middle = steps.len() / 2;
+        let interval =
+            (!steps.is_empty()).then(|| *steps.select_nth_unstable_by(middle, f64::total_cmp).1);
+        let ends = stamps.first().zip(stamps.last());
+        Self {
+            first: ends.map_or(0.0, |(first, _)| *first),
+            interval: interval.unwrap_or_default(),
+            lasts: ends.map_or(0.0, |(first, last)| last - first),
+            ..Self::default()
+        }
+    }
+}
+
 impl Unit {
     /// The unit of `factor` seconds.
     pub fn of_factor(factor: f64) -> Unit {
