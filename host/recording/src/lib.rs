@@ -9,6 +9,7 @@
 pub mod digits;
 pub mod error;
 pub mod health;
+pub mod labelled;
 pub mod result_file;
 pub mod signed_low_byte;
 pub mod units;

@@ -17,6 +17,8 @@ pub enum Separator {
     Tab,
     /// Any number of blanks and tabs.
     Whitespace,
+    /// Labels among the numbers, as in `ax:1 ay:2`; see [`labelled`](crate::labelled).
+    Labels,
     /// Each of several characters, as in messages of receivers: `$A,1;2*5f` has four cells.
     AnyOf(Characters),
 }
@@ -81,7 +83,7 @@ impl Separator {
     /// Whether `byte` separates cells.
     pub(crate) fn separates(self, byte: u8) -> bool {
         match self {
-            Separator::Comma => byte == b',',
+            Separator::Comma | Separator::Labels => byte == b',',
             Separator::Semicolon => byte == b';',
             Separator::Tab => byte == b'\t',
             Separator::Whitespace => byte.is_ascii_whitespace(),
@@ -93,7 +95,8 @@ impl Separator {
     pub(crate) fn split(self, line: &[u8], cells: &mut csv::ByteRecord) {
         cells.clear();
         let delimiter = match self {
-            Separator::Comma => b',',
+            // The numbers of labelled lines are put together with commas.
+            Separator::Comma | Separator::Labels => b',',
             Separator::Semicolon => b';',
             Separator::Tab => b'\t',
             Separator::AnyOf(characters) => {
@@ -153,11 +156,12 @@ impl FromStr for Separator {
             ";" | "semicolon" => Ok(Separator::Semicolon),
             "\t" | "tab" => Ok(Separator::Tab),
             " " | "whitespace" => Ok(Separator::Whitespace),
+            "labels" => Ok(Separator::Labels),
             _ => Characters::of(text).map(Separator::AnyOf).ok_or_else(|| {
                 Error::new(
                     "separator",
                     format!("{} is unknown", shorten(text.as_bytes())),
-                    "write comma, semicolon, tab, whitespace, or all characters that separate cells: ',;*'",
+                    "write comma, semicolon, tab, whitespace, labels, or all characters that separate cells: ',;*'",
                 )
             }),
         }
@@ -175,6 +179,7 @@ impl fmt::Display for Separator {
             Separator::Semicolon => "semicolon",
             Separator::Tab => "tab",
             Separator::Whitespace => "whitespace",
+            Separator::Labels => "labels",
         })
     }
 }

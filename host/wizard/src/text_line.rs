@@ -1,10 +1,10 @@
-//! Parses lines of text into readings, and recognises lines without data.
+//! Turns lines of text into readings, and recognises lines without data.
 //!
-//! Sketches write numbers separated by commas, semicolons, tabs or spaces. Often there is a label in front (`a/g:`, `Accel: 1, 2, 3 Gyro: …`) or one
-//! for each number (`ax:1,ay:2`, as for the Arduino plotter), and a greeting comes first. MotionCal's boards alternately write `Raw:` with nine
-//! integers and `Uni:` with the same nine in SI.
+//! [`Line`] knows how sketches separate and label their numbers. A greeting comes first. MotionCal's boards alternately write `Raw:` with nine integers
+//! and `Uni:` with the same nine in SI.
 
 use mimu_recording::error::{Argument, Error, Result};
+use mimu_recording::labelled::Line;
 use mimu_recording::look::column_named;
 use mimu_recording::{Column, Decimal};
 
@@ -130,8 +130,8 @@ pub struct Lines {
     open: Vec<u8>,
     /// Whether the start of the current line was received: text before the first line end may be the second half of a line.
     whole: bool,
-    /// Label before the first number of the data lines.
-    label: Option<String>,
+    /// Labels among the numbers of the data lines.
+    labels: Option<String>,
     count: u64,
     refused: u64,
     /// Lines of numbers with another label than the data lines.
@@ -148,7 +148,7 @@ impl Lines {
             columns,
             open: Vec::new(),
             whole: false,
-            label: None,
+            labels: None,
             count: 0,
             refused: 0,
             others: 0,
@@ -183,13 +183,20 @@ impl Lines {
     }
 
     fn line(&mut self, text: &str) -> Option<Reading> {
-        let parsed = numbers(text);
-        let other = |(label, _): &(&str, Vec<f64>)| self.label.as_ref().is_some_and(|l| l != label);
+        let width = self.columns.columns.len();
+        // The time that an operating system writes before the numbers is a column only if one is named.
+        let parsed = Line::parse(text).and_then(|line| {
+            let timed = line.numbers.len() < width;
+            Some((line.labels(), line.values(timed)?))
+        });
+        let other = |(labels, numbers): &(String, Vec<f64>)| {
+            numbers.len() == width && self.labels.as_ref().is_some_and(|own| own != labels)
+        };
         if parsed.as_ref().is_some_and(other) {
             self.others += 1;
             return None;
         }
-        let found = parsed.and_then(|(label, numbers)| self.reading(label, &numbers));
+        let found = parsed.and_then(|(labels, numbers)| self.reading(labels, &numbers));
         match found {
             Some(reading) => {
                 self.count += 1;
@@ -206,18 +213,16 @@ impl Lines {
         }
     }
 
-    fn reading(&mut self, label: &str, numbers: &[f64]) -> Option<Reading> {
+    fn reading(&mut self, labels: String, numbers: &[f64]) -> Option<Reading> {
         if numbers.len() != self.columns.columns.len() {
             let motion_cal = Columns::motion_cal();
-            let is = self.label.is_none() && label == "Raw";
+            let is = self.labels.is_none() && labels == "Raw";
             if !is || numbers.len() != motion_cal.columns.len() {
                 return None;
             }
             self.columns = motion_cal;
         }
-        if self.label.is_none() {
-            self.label = Some(label.to_owned());
-        }
+        self.labels.get_or_insert(labels);
         let mut reading = Reading {
             raw: [0.0; 6],
             temp_c: f64::NAN,
@@ -283,11 +288,11 @@ impl Lines {
 
     /// Number of lines of numbers with another label; `None` if zero.
     pub fn others_in_words(&self) -> Option<String> {
-        let label = self.label.as_deref().unwrap_or_default();
+        let labels = self.labels.as_deref().unwrap_or_default();
         let others = self.others;
-        (others > 0).then(|| match label {
+        (others > 0).then(|| match labels {
             "" => format!("{others} lines with a label are left out"),
-            label => format!("{others} lines without the label {label:?} are left out"),
+            labels => format!("{others} lines without the label {labels:?} are left out"),
         })
     }
 
@@ -314,29 +319,6 @@ impl Lines {
             self.columns.names
         )
     }
-}
-
-/// The leading label and the numbers of a line; `None` if it contains anything else.
-pub fn numbers(text: &str) -> Option<(&str, Vec<f64>)> {
-    let mut label = "";
-    let mut numbers = Vec::new();
-    for word in text.split([',', ';', '\t', ' ']) {
-        let number = match word.rfind([':', '=']) {
-            Some(at) => {
-                if numbers.is_empty() && label.is_empty() {
-                    label = &word[..at];
-                }
-                &word[at + 1..]
-            }
-            None => word,
-        };
-        if number.is_empty() {
-            continue;
-        }
-        let value: f64 = number.parse().ok().filter(|v: &f64| v.is_finite())?;
-        numbers.push(value);
-    }
-    Some((label, numbers))
 }
 
 #[cfg(test)]
@@ -375,6 +357,9 @@ mod tests {
             "ax:1,ay:2,az:3,gx:4,gy:5,gz:6\n",
             "ax=1 ay=2 az=3 gx=4 gy=5 gz=6\n",
             "Accel: 1, 2, 3 Gyro: 4, 5, 6\n",
+            "I (123456) imu: 1 2 3 4 5 6\n",
+            "{\"acc\":[1,2,3],\"gyro\":{\"x\":4,\"y\":5,\"z\":6}}\n",
+            "ax: 1 m/s^2, ay: 2 m/s^2, az: 3 m/s^2, gx: 4 dps, gy: 5 dps, gz: 6 dps\n",
         ] {
             let (readings, lines) = read(SIX, line);
             assert_eq!(readings.len(), 1, "{line}");

@@ -131,6 +131,7 @@ pub(super) enum Fault {
     /// The last row lacks its end: the card was pulled out, or the supply failed. It is left out without being asked.
     Truncated,
     Reading,
+    Checksum,
     Time,
     Step,
 }
@@ -141,6 +142,7 @@ impl Fault {
             Fault::Width => "another number of cells",
             Fault::Truncated => "a cut end",
             Fault::Reading => "a cell that is not a reading",
+            Fault::Checksum => "a wrong checksum",
             Fault::Time => "no time",
             Fault::Step => "an invalid number in step",
         }

@@ -24,7 +24,10 @@ pub(super) fn times(
     let stamps = read(path, &mut file)?;
     let (name, counter) = (file.time_name(), file.counts_samples());
     let known = Known {
-        factor: how.time_factor(path),
+        factor: match file.has_calendar_times() {
+            true => Some(1.0),
+            false => how.time_factor(path),
+        },
         counter,
         native: log::unit(path),
         // A counter without a given rate has that of the file to which it is joined.

@@ -287,6 +287,11 @@ impl ForeignFile {
         }
     }
 
+    /// Whether its times so far are dates or times of day.
+    pub fn has_calendar_times(&self) -> bool {
+        matches!(&self.table, Table::Text(table) if table.calendar)
+    }
+
     /// Sets the times of the rows; no row has been read yet.
     pub fn with_times(mut self, times: Times) -> Self {
         self.clock = Some(Clock::new(times));

@@ -80,6 +80,11 @@ use sequence::import_sequence;
 use super::writer::Writer;
 use crate::error::Result;
 
+/// Whether a cell is a time of day or a date with one.
+pub(crate) fn is_calendar_time(cell: &[u8]) -> bool {
+    time::calendar_time(cell).is_some()
+}
+
 /// Imports foreign files as a recording at `out`; `progress` receives the share of the first file that has been read.
 pub fn import(
     options: &ImportOptions,

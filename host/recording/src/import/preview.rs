@@ -13,6 +13,7 @@ use super::text_table::split;
 use crate::cell;
 use crate::csv_file::BOM;
 use crate::error::{Error, Result};
+use crate::labelled::{Samples, UNITS};
 use crate::separator::Separator;
 
 /// Bytes that are read at the start for each row: a longer row is rare.
@@ -27,7 +28,7 @@ pub struct Preview {
     pub names: Vec<String>,
     /// Units in a line of their own below the names; empty if there is none.
     pub units: Vec<String>,
-    /// The separator, if it is not one that an import recognises: that of lines with a label before each number.
+    /// The separator, if it is one that an import does not recognise: labels among the numbers.
     #[serde(skip)]
     pub separator: Option<Separator>,
     /// The first rows, cell by cell, as they are written.
@@ -85,16 +86,24 @@ fn table_or_labelled(
     let is_table = |t: &Preview| {
         !t.names.is_empty() || !t.rows.iter().flatten().any(|cell| begins_with_label(cell))
     };
-    if separator.is_some() || table.as_ref().is_some_and(is_table) {
-        return table;
+    match separator {
+        Some(Separator::Labels) => labelled(lines, most),
+        Some(_) => table,
+        None if table.as_ref().is_some_and(is_table) => table,
+        // Without names, labels are as good as words in cells.
+        None => {
+            let found = labelled(lines, most);
+            let named = found.as_ref().is_some_and(|found| !found.names.is_empty());
+            if named { found } else { table.or(found) }
+        }
     }
-    labelled(lines, most).or(table)
 }
 
 /// Whether a label and more stand in the cell, as in `acc: 1`. A time of day does not begin with a letter.
 fn begins_with_label(cell: &str) -> bool {
     let cell = cell.trim();
-    let rest = cell.trim_start_matches(char::is_alphanumeric);
+    let part = |c: char| c.is_alphanumeric() || "/_. ".contains(c);
+    let rest = cell.trim_start_matches(part);
     cell.starts_with(char::is_alphabetic) && rest.starts_with([':', '='])
 }
 
@@ -133,10 +142,17 @@ fn of_lines(lines: &[&[u8]], separator: Option<Separator>, most: usize) -> Optio
         .map(|line| cells(signs.skipped(line)));
     let mut headers = above.filter(|row| row.len() == width && numbers(row) == 0);
     let nearest = headers.next().unwrap_or_default();
-    let (names, units) = match headers.next() {
+    let (mut names, units) = match headers.next() {
         Some(names) if is_units(&nearest) => (names, nearest),
         _ => (nearest, Vec::new()),
     };
+    let begins = cells(lines[first]).swap_remove(0);
+    if let Some((_, fields)) = SENTENCES.iter().find(|(sentence, _)| *sentence == begins) {
+        names = std::iter::once("")
+            .chain(fields.split(','))
+            .map(str::to_owned)
+            .collect();
+    }
     let rows = lines[first..].iter().filter(|line| is_row(line));
     Some(Preview {
         names,
@@ -145,6 +161,26 @@ fn of_lines(lines: &[&[u8]], separator: Option<Separator>, most: usize) -> Optio
         ..Preview::default()
     })
 }
+
+/// Fields of the messages of VectorNav's units, by the manual of the VN-100 (asynchronous output, ASCII).
+const SENTENCES: [(&str, &str); 4] = [
+    (
+        "$VNYMR",
+        "yaw,pitch,roll,mag_x,mag_y,mag_z,accel_x [m/s²],accel_y [m/s²],accel_z [m/s²],gyro_x [rad/s],gyro_y [rad/s],gyro_z [rad/s]",
+    ),
+    (
+        "$VNQMR",
+        "qx,qy,qz,qw,mag_x,mag_y,mag_z,accel_x [m/s²],accel_y [m/s²],accel_z [m/s²],gyro_x [rad/s],gyro_y [rad/s],gyro_z [rad/s]",
+    ),
+    (
+        "$VNMAR",
+        "mag_x,mag_y,mag_z,accel_x [m/s²],accel_y [m/s²],accel_z [m/s²],gyro_x [rad/s],gyro_y [rad/s],gyro_z [rad/s]",
+    ),
+    (
+        "$VNIMU",
+        "mag_x,mag_y,mag_z,accel_x [m/s²],accel_y [m/s²],accel_z [m/s²],gyro_x [rad/s],gyro_y [rad/s],gyro_z [rad/s],temp_c,pressure",
+    ),
+];
 
 /// Whether a line of words is one of units, below the names: short words, or brackets.
 fn is_units(row: &[String]) -> bool {
@@ -159,123 +195,20 @@ fn is_units(row: &[String]) -> bool {
         && filled.count() * 2 >= row.len()
 }
 
-/// Units as they stand alone in a cell.
-const UNITS: [&str; 31] = [
-    "s", "ms", "us", "µs", "ns", "g", "mg", "m/s^2", "m/s2", "m/s²", "mps2", "deg/s", "dps", "°/s",
-    "mdps", "rad/s", "deg", "°C", "C", "degC", "uT", "µT", "Gauss", "gauss", "V", "counts",
-    "count", "LSB", "raw", "Pa", "hPa",
-];
-
-/// Separators of lines with labels among the numbers: `ax:1,ay:2`, `AcX = 1 | AcY = 2`, `gx: 1 gy: 2`, `ACC: X=1,Y=2,Z=3`. Those that leave the
-/// fewest empty cells come first.
-const OF_LABELS: [&str; 13] = [
-    ":,", ":;", "=,", "=;", "=|", ":|", ": ", "= ", ":=,", ":, ", "=, ", ":=, ", ":=,; |",
-];
-
-/// Lines of labels, the same in all lines, and numbers.
+/// Lines of labels, the same in all samples, and numbers.
 fn labelled(lines: &[&[u8]], most: usize) -> Option<Preview> {
-    OF_LABELS.iter().find_map(|text| {
-        let separator: Separator = text.parse().ok()?;
-        let mut record = csv::ByteRecord::new();
-        let mut cells = |line: &[u8]| -> Vec<String> {
-            separator.split(line.trim_ascii(), &mut record);
-            let text = |cell: &[u8]| String::from_utf8_lossy(cell).into_owned();
-            record.iter().map(text).collect()
-        };
-        let rows: Vec<Vec<String>> = lines
-            .iter()
-            .map(|line| cells(line))
-            .filter(|row| names_between(row).is_some())
-            .take(most)
-            .collect();
-        let names = names_between(rows.first()?)?;
-        let alike = rows
-            .iter()
-            .filter(|row| names_between(row).as_ref() == Some(&names))
-            .count();
-        // A line of a title, or a cut one, has other labels.
-        if rows.len() < 2 || 10 * alike < 9 * rows.len() {
-            return None;
-        }
-        Some(Preview {
-            names,
-            separator: Some(separator),
-            rows,
-            ..Preview::default()
-        })
+    let samples = Samples::find(lines)?;
+    let names = match samples.are_named() {
+        true => samples.names.clone(),
+        false => Vec::new(),
+    };
+    let all = samples.all(lines).into_iter().map(|(_, sample)| sample);
+    Some(Preview {
+        names,
+        separator: Some(Separator::Labels),
+        rows: all.take(most).collect(),
+        ..Preview::default()
     })
-}
-
-/// A number of a line, and what stands around it.
-struct Labelled<'a> {
-    cell: usize,
-    /// The labels since the number before.
-    labels: Vec<&'a str>,
-    /// The unit behind it.
-    unit: Option<&'a str>,
-}
-
-/// The names of the cells of a line of labels and numbers: that of a number consists of the labels before it, that of a label is empty. A label
-/// before several axes, as in `ACC: X=1,Y=2,Z=3`, or before three numbers, as in `acc 1 2 3`, belongs to each of them; a unit behind a
-/// number belongs to it. `None` for fewer than two numbers, and if labels do not tell them apart.
-fn names_between(row: &[String]) -> Option<Vec<String>> {
-    let is_axis = |label: &str| ["x", "y", "z"].contains(&label.to_lowercase().as_str());
-    let mut numbers: Vec<Labelled> = Vec::new();
-    let mut labels: Vec<&str> = Vec::new();
-    let is_number = |text: &str| cell::number(text.as_bytes()).is_ok_and(f64::is_finite);
-    for (cell, text) in row.iter().enumerate() {
-        // Another separator cuts these.
-        let several = text.contains([',', ';', '|']) || text.split([' ', ':', '=']).any(is_number);
-        if !is_number(text) && several {
-            return None;
-        }
-        if is_number(text) {
-            numbers.push(Labelled {
-                cell,
-                labels: std::mem::take(&mut labels),
-                unit: None,
-            });
-            continue;
-        }
-        match numbers.last_mut() {
-            Some(number) if labels.is_empty() && UNITS.contains(&text.as_str()) => {
-                number.unit = Some(text);
-            }
-            _ if text.is_empty() => {}
-            // `ACC: X` behind a separator that is not the colon.
-            _ => match text.rsplit_once([':', ' ']) {
-                Some((of, axis)) if is_axis(axis) => {
-                    labels.extend([of.trim_end_matches([':', ' ']), axis]);
-                }
-                _ => labels.push(text),
-            },
-        }
-    }
-    if numbers.len() < 2 || numbers[0].labels.is_empty() || !labels.is_empty() {
-        return None;
-    }
-    let mut names = vec![String::new(); row.len()];
-    let mut group = String::new();
-    // A number with labels, and those without any behind it.
-    for run in numbers.chunk_by(|_, next| next.labels.is_empty()) {
-        let (last, of) = run[0].labels.split_last()?;
-        let each: Vec<String> = match run.len() {
-            1 if of.is_empty() && is_axis(last) => vec![format!("{group} {last}")],
-            1 => {
-                group = of.join(" ");
-                vec![run[0].labels.join(" ")]
-            }
-            3 => ["x", "y", "z"]
-                .map(|axis| format!("{} {axis}", run[0].labels.join(" ")))
-                .to_vec(),
-            _ => return None,
-        };
-        for (number, name) in run.iter().zip(each) {
-            let unit = number.unit.map(|unit| format!(" [{unit}]"));
-            names[number.cell] = name.trim().to_owned() + &unit.unwrap_or_default();
-        }
-    }
-    Some(names)
 }
 
 #[cfg(test)]
@@ -308,36 +241,6 @@ mod tests {
         assert_eq!(preview.rows, [["0,01", "2", "3"], ["0,02", "4", "5"]]);
         assert_eq!(of("# t wx ax\n0 1 2\n1 1 2\n").names, ["t", "wx", "ax"]);
         assert!(of("1\t2\n3\t4\n").names.is_empty());
-    }
-
-    #[test]
-    fn labels_among_the_numbers_are_their_names() {
-        for (line, names) in [
-            ("t:1,ax:2,ay:-3", "t|ax|ay"),
-            ("AcX = 1 | AcY = 2", "AcX|AcY"),
-            (
-                "GYRO: X=1.5,Y=-2,Z=3,ACC: X=4,Y=5,Z=6",
-                "GYRO X|GYRO Y|GYRO Z|ACC X|ACC Y|ACC Z",
-            ),
-            (
-                "Gyro: 1, 2, 3 Accel: 4, 5, 6",
-                "Gyro x|Gyro y|Gyro z|Accel x|Accel y|Accel z",
-            ),
-            ("ax: 1.0 m/s^2, ay: 2.0 m/s^2", "ax [m/s^2]|ay [m/s^2]"),
-            ("t=12 gyro x=1 y=2 z=3", "t|gyro x|gyro y|gyro z"),
-        ] {
-            let lines = [line.as_bytes(); 3];
-            let preview = labelled(&lines, 10).expect(line);
-            let named: Vec<String> = preview
-                .names
-                .into_iter()
-                .filter(|n| !n.is_empty())
-                .collect();
-            assert_eq!(named.join("|"), names, "{line}");
-        }
-        for line in ["a:1,2", "1:a,2:b", "hello", "v: 1 2 3 4"] {
-            assert!(labelled(&[line.as_bytes(); 3], 10).is_none(), "{line}");
-        }
     }
 
     #[test]

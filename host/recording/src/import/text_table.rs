@@ -15,6 +15,7 @@ use crate::cell::{self, Refusal, shorten};
 use crate::columns::Column;
 use crate::csv_file::BOM;
 use crate::error::{Argument, Error, Result};
+use crate::labelled::{Samples, Taken};
 use crate::separator::Separator;
 
 /// Bytes at the start within which the data must begin.
@@ -41,6 +42,8 @@ pub(super) struct TextTable {
     comments: CommentSigns,
     reader: BufReader<Chain<Cursor<Vec<u8>>, File>>,
     separator: Separator,
+    /// Puts the rows together, if labels separate their cells.
+    labelled: Option<Samples>,
     /// Position and role of each wanted cell.
     wanted: Vec<(usize, Role)>,
     /// Number of cells that a row must have; further cells must be empty.
@@ -59,6 +62,8 @@ pub(super) struct TextTable {
     bytes: u64,
     length: u64,
     record: csv::ByteRecord,
+    /// Whether its times are dates or times of day, which are in s.
+    pub calendar: bool,
     pub skipped: SkippedLines,
     /// Zero bytes around the lines, which were left out.
     pub zero_bytes: u64,
@@ -115,9 +120,25 @@ fn kind(line: &[u8], comments: CommentSigns) -> Kind {
     }
 }
 
-/// Splits a line into cells. What a serial monitor puts before it (`15:04:23.125 -> 1,2,3`) is its first cell.
+/// A line without its checksum in the manner of NMEA, `$VNYMR,1,2*5F`, and whether that is right: the exclusive or of what is between $ and *.
+fn checksum(line: &[u8]) -> Option<(&[u8], bool)> {
+    let (sentence, sum) = line.trim_ascii().split_last_chunk::<3>()?;
+    let digits = std::str::from_utf8(sum).ok()?.strip_prefix('*')?;
+    let sum = u8::from_str_radix(digits, 16).ok()?;
+    let bytes = sentence.strip_prefix(b"$")?;
+    Some((
+        sentence,
+        bytes.iter().fold(0, |all, byte| all ^ byte) == sum,
+    ))
+}
+
+/// Splits a line into cells, without a checksum at its end. What a serial monitor puts before it (`15:04:23.125 -> 1,2,3`) is its first cell.
 pub(super) fn split(separator: Separator, line: &[u8], cells: &mut csv::ByteRecord) {
     const ARROW: &[u8] = b" -> ";
+    let line = match checksum(line) {
+        Some((sentence, _)) if !separator.separates(b'*') => sentence,
+        _ => line,
+    };
     let arrow = line.windows(ARROW.len()).position(|part| part == ARROW);
     let Some(at) = arrow.filter(|at| calendar_time(&line[..*at]).is_some()) else {
         separator.split(line, cells);
@@ -165,11 +186,20 @@ impl TextTable {
                 .collect();
             Separator::detect(&shown)
         });
+        let (labelled, cells) = match separator {
+            Separator::Labels => Self::labelled(path, &lines)?,
+            _ => (None, Vec::new()),
+        };
+        let lines: Vec<&[u8]> = match cells.is_empty() {
+            true => lines,
+            false => cells.iter().map(Vec::as_slice).collect(),
+        };
         let mut table = TextTable {
             path: path.to_owned(),
             comments,
             reader: BufReader::new(Cursor::new(Vec::new()).chain(file)),
             separator,
+            labelled,
             wanted: Vec::new(),
             width: 0,
             names: Vec::new(),
@@ -182,6 +212,7 @@ impl TextTable {
             bytes: 0,
             length,
             record: csv::ByteRecord::new(),
+            calendar: false,
             skipped: SkippedLines::default(),
             zero_bytes: 0,
             warnings: Vec::new(),
@@ -193,6 +224,27 @@ impl TextTable {
         let start = Cursor::new(head).chain(file);
         table.reader = BufReader::with_capacity(1 << 18, start);
         Ok(table)
+    }
+
+    /// What puts rows of labelled `lines` together, and the lines with each row in the place of its first line.
+    fn labelled(path: &Path, lines: &[&[u8]]) -> Result<(Option<Samples>, Vec<Vec<u8>>)> {
+        let found = Samples::find(lines).ok_or_else(|| {
+            let problem = "no labels come again from line to line";
+            Error::new(
+                path.display(),
+                problem,
+                "give the character that separates its cells",
+            )
+            .about(Argument::Separator)
+        })?;
+        let all = found.clone().all(lines);
+        let first = all.first().map_or(0, |(number, _)| *number as usize);
+        let mut cells: Vec<Vec<u8>> = lines[..first].iter().map(|line| line.to_vec()).collect();
+        cells.resize(lines.len(), Vec::new());
+        for (number, sample) in all {
+            cells[number as usize] = sample.join(",").into_bytes();
+        }
+        Ok((Some(found), cells))
     }
 
     /// Roles in the order of [`Cells::numbers`].
@@ -223,32 +275,9 @@ impl TextTable {
     /// Reads the next row into `cells` and returns its line, or `None` at the end.
     pub fn next(&mut self, cells: &mut Cells) -> std::result::Result<Option<u64>, Unreadable> {
         loop {
-            self.line.clear();
-            let read = (&mut self.reader)
-                .take(LONGEST_LINE)
-                .read_until(b'\n', &mut self.line)
-                .map_err(|error| Error::io(&self.path, &error))?;
-            if read == 0 {
+            let Some((number, ended)) = self.next_line()? else {
                 return Ok(None);
-            }
-            self.bytes += read as u64;
-            let ended = self.line.pop_if(|last| *last == b'\n').is_some();
-            self.leave_out_zeros();
-            // Preallocated space has no line ends.
-            if !ended && self.line.is_empty() {
-                continue;
-            }
-            self.line_number += 1;
-            let number = self.line_number;
-            if !ended && read as u64 == LONGEST_LINE {
-                let problem = "the line is longer than 1 MiB";
-                let remedy = "give a text file with one row a line";
-                return Err(Error::new(self.place(number), problem, remedy).into());
-            }
-            if number < self.first_row {
-                // Counted when the file was opened.
-                continue;
-            }
+            };
             match kind(&self.line, self.comments) {
                 Kind::Blank => self.skipped.blank += 1,
                 Kind::Comment => self.skipped.comment += 1,
@@ -273,9 +302,100 @@ impl TextTable {
                         };
                         return Err(Unreadable::row(number, fault, place, refusal));
                     }
+                    if checksum(&self.line).is_some_and(|(_, right)| !right) {
+                        let refusal = Refusal {
+                            problem: "its checksum is wrong".into(),
+                            remedy: "remove the row",
+                        };
+                        return Err(Unreadable::row(
+                            number,
+                            Fault::Checksum,
+                            self.place(number),
+                            refusal,
+                        ));
+                    }
                     self.parse(number, cells)?;
                     return Ok(Some(number));
                 }
+            }
+        }
+    }
+
+    /// Puts the next line, or the next row of labelled lines, into `line`. Returns its number and whether it is whole, `None` at the end.
+    fn next_line(&mut self) -> std::result::Result<Option<(u64, bool)>, Unreadable> {
+        loop {
+            let read = self.read_line()?;
+            let number = self.line_number;
+            let Some(samples) = &mut self.labelled else {
+                return Ok(read.map(|ended| (number, ended)));
+            };
+            let sample = match read {
+                None => samples.finish(),
+                Some(ended) => match samples.take(number, &self.line) {
+                    Taken::Part(before) => before,
+                    Taken::Words if self.line.trim_ascii().is_empty() => {
+                        self.skipped.blank += 1;
+                        None
+                    }
+                    Taken::Words => {
+                        self.skipped.header += 1;
+                        None
+                    }
+                    Taken::Damaged => {
+                        let fault = if ended {
+                            Fault::Width
+                        } else {
+                            Fault::Truncated
+                        };
+                        let refusal = Refusal {
+                            problem: format!(
+                                "{} has other labels than the rows",
+                                shorten(&self.line)
+                            ),
+                            remedy: "correct or remove the line",
+                        };
+                        return Err(Unreadable::row(number, fault, self.place(number), refusal));
+                    }
+                },
+            };
+            match (sample, read) {
+                (Some((number, sample)), _) => {
+                    self.line = sample.join(",").into_bytes();
+                    return Ok(Some((number, true)));
+                }
+                (None, None) => return Ok(None),
+                (None, Some(_)) => {}
+            }
+        }
+    }
+
+    /// Reads the next line of the file, from the first row on. Returns whether it has an end, or `None` at the end of the file.
+    fn read_line(&mut self) -> std::result::Result<Option<bool>, Unreadable> {
+        loop {
+            self.line.clear();
+            let read = (&mut self.reader)
+                .take(LONGEST_LINE)
+                .read_until(b'\n', &mut self.line)
+                .map_err(|error| Error::io(&self.path, &error))?;
+            if read == 0 {
+                return Ok(None);
+            }
+            self.bytes += read as u64;
+            let ended = self.line.pop_if(|last| *last == b'\n').is_some();
+            self.leave_out_zeros();
+            // Preallocated space has no line ends.
+            if !ended && self.line.is_empty() {
+                continue;
+            }
+            self.line_number += 1;
+            if !ended && read as u64 == LONGEST_LINE {
+                let problem = "the line is longer than 1 MiB";
+                let remedy = "give a text file with one row a line";
+                return Err(Error::new(self.place(self.line_number), problem, remedy).into());
+            }
+            // Lines above were counted when the file was opened.
+            if self.line_number >= self.first_row {
+                return Ok(Some(ended));
             }
         }
     }
@@ -330,7 +450,7 @@ impl TextTable {
         cell::number(cell)
     }
 
-    fn parse(&self, line: u64, cells: &mut Cells) -> std::result::Result<(), Unreadable> {
+    fn parse(&mut self, line: u64, cells: &mut Cells) -> std::result::Result<(), Unreadable> {
         cells.numbers.clear();
         cells.step.clear();
         let mut nanoseconds = None;
@@ -345,6 +465,7 @@ impl TextTable {
             if time && let Some(stamp) = calendar_time(cell) {
                 cells.stamp = stamp;
                 cells.numbers.push(stamp.value);
+                self.calendar = true;
                 continue;
             }
             let number = self.number(cell).map_err(|refusal| {

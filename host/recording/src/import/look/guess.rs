@@ -189,35 +189,29 @@ fn by_readings(file: &str, width: usize, rows: &[Vec<f64>]) -> Guess {
             ..Guess::default()
         };
     }
-    let time = (0..width).find(|&at| grows(at));
-    let first = time.map_or(0, |at| at + 1);
-    if let Some(at) = time {
-        roles[at] = "t_s";
+    let is_number =
+        |at: &usize| 10 * column(*at).filter(|v| v.is_finite()).count() >= 9 * rows.len();
+    let numbers: Vec<usize> = (0..width).filter(is_number).collect();
+    let time = numbers.iter().position(|&at| grows(at));
+    let behind = &numbers[time.map_or(0, |k| k + 1)..];
+    if let Some(k) = time {
+        roles[numbers[k]] = "t_s";
     }
     // Gravity is large compared with the noise of a unit at rest; a rate of zero is not.
-    let size = |from: usize| -> f64 {
-        let mean = |at| column(at).sum::<f64>() / rows.len().max(1) as f64;
-        (from..from + 3)
-            .map(|at| mean(at).powi(2))
-            .sum::<f64>()
-            .sqrt()
+    let size = |triad: &[usize]| -> f64 {
+        let mean = |at: &usize| column(*at).sum::<f64>() / rows.len().max(1) as f64;
+        triad.iter().map(|at| mean(at).powi(2)).sum::<f64>().sqrt()
     };
-    match width.saturating_sub(first) {
-        0..3 => {}
-        3..6 if file.to_lowercase().contains("gyr") => {
-            roles[first..first + 3].copy_from_slice(&GYRO)
-        }
-        3..6 => roles[first..first + 3].copy_from_slice(&ACCEL),
-        _ => {
-            let gyro_first = size(first) <= size(first + 3);
-            let (a, b) = if gyro_first {
-                (GYRO, ACCEL)
-            } else {
-                (ACCEL, GYRO)
-            };
-            roles[first..first + 3].copy_from_slice(&a);
-            roles[first + 3..first + 6].copy_from_slice(&b);
-        }
+    let gyro_alone = file.to_lowercase().contains("gyr");
+    let sensors: &[[&'static str; 3]] = match behind.len() {
+        0..3 => &[],
+        3..6 if gyro_alone => &[GYRO],
+        3..6 => &[ACCEL],
+        _ if size(&behind[..3]) <= size(&behind[3..6]) => &[GYRO, ACCEL],
+        _ => &[ACCEL, GYRO],
+    };
+    for (at, role) in behind.iter().zip(sensors.iter().flatten()) {
+        roles[*at] = role;
     }
     Guess {
         roles,

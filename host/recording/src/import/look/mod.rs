@@ -239,9 +239,16 @@ impl Look {
             let mut guess = guess(&file, &seen.names, &seen.units, judged);
             guess.time_unit = given.time_unit.or(guess.time_unit);
             // A date or a time of day is in s, whatever its name says.
+            let first = seen.rows.first();
+            let dated = |at: &usize| {
+                let cell = first.and_then(|row| row.get(*at));
+                cell.is_some_and(|cell| calendar_time(cell.as_bytes()).is_some())
+            };
+            let unused = |at: &usize| guess.roles[*at] == "-";
             let time = guess.roles.iter().position(|role| *role == "t_s");
-            let first = time.and_then(|at| seen.rows.first()?.get(at));
-            if first.is_some_and(|cell| calendar_time(cell.as_bytes()).is_some()) {
+            let time = time.or_else(|| (0..guess.roles.len()).filter(unused).find(dated));
+            if let Some(at) = time.filter(dated) {
+                guess.roles[at] = "t_s";
                 guess.time_unit = None;
                 guess.calendar = true;
             }
