@@ -139,6 +139,7 @@ function importArguments(looked, names, roles, device, alone = false) {
       present.forEach((sensor, k) => TO_SI[sensor][units[k]] !== 1 && args.push("--scale", `${sensor}=${TO_SI[sensor][units[k]]}`));
       args.push("--raw-unit", "SI");
     } else args.push("--raw-unit", units.every((unit) => unit === "V") ? "V" : "count");
+    add("--separator", looked.files.map((file) => file.separator).find(Boolean));
     add("--time-unit", $("time-unit").value);
     add("--rate-hz", $("rate").value.trim().replace(",", "."));
   } else {

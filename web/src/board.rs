@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use mimu_recording::error::{Error, Result};
-use mimu_wizard::text_line::numbers;
+use mimu_recording::labelled::Line;
 use serde::Serialize;
 
 use mimu_recording::Decimal;
@@ -29,15 +29,6 @@ pub struct Lines {
     by_readings: bool,
     /// Whether the readings are in SI; `None` if one sensor's are, and those of the other may be.
     si: Option<bool>,
-}
-
-/// The label of each number of a line, if each has one (`ax:1,ay:2`).
-fn labels(line: &str) -> Vec<String> {
-    let words = line.split([',', ';', '\t', ' ']).filter(|w| !w.is_empty());
-    let labels: Option<Vec<String>> = words
-        .map(|word| word.rfind([':', '=']).map(|at| word[..at].to_owned()))
-        .collect();
-    labels.unwrap_or_default()
 }
 
 /// The unit of a clock, from its progress in a second. A replay may be tens of times faster than the board was.
@@ -72,26 +63,26 @@ fn look(text: &str, seconds: f64) -> Lines {
         shown: shown.map(|line| line.chars().take(120).collect()).collect(),
         ..Lines::default()
     };
-    let read: Vec<(&str, &str, Vec<f64>)> = lines
-        .iter()
-        .filter_map(|line| numbers(line).map(|(label, numbers)| (*line, label, numbers)))
-        .filter(|(_, _, numbers)| numbers.len() > 5)
+    let parsed = lines.iter().filter_map(|line| Line::parse(line));
+    let read: Vec<(Line, Vec<f64>)> = parsed
+        .filter_map(|line| line.values(false).map(|numbers| (line, numbers)))
+        .filter(|(_, numbers)| numbers.len() > 5)
         .collect();
     // MotionCal's boards also write the same readings in SI, in alternate lines.
-    let raw = read.iter().any(|(_, label, _)| *label == "Raw");
-    let of_data = |(_, label, _): &&(&str, &str, Vec<f64>)| !raw || *label == "Raw";
-    let Some((line, _, first)) = read.iter().rev().find(of_data) else {
+    let raw = read.iter().any(|(line, _)| line.labels() == "Raw");
+    let of_data = |(line, _): &&(Line, Vec<f64>)| !raw || line.labels() == "Raw";
+    let Some((line, first)) = read.iter().rev().find(of_data) else {
         return found;
     };
     let like = read.iter().filter(of_data);
     let rows: Vec<Vec<f64>> = like
-        .map(|(_, _, numbers)| numbers.clone())
+        .map(|(_, numbers)| numbers.clone())
         .filter(|numbers| numbers.len() == first.len())
         .collect();
     let header = header.filter(|words| words.len() == first.len());
-    found.names = match labels(line) {
-        names if names.len() == first.len() => names,
-        _ => header
+    found.names = match line.names() {
+        Some(names) => names,
+        None => header
             .unwrap_or_default()
             .into_iter()
             .map(str::to_owned)
@@ -104,7 +95,7 @@ fn look(text: &str, seconds: f64) -> Lines {
             ],
             ..Guess::default()
         },
-        false => guess("board", &found.names, &[], &rows),
+        false => guess("board", &found.names, &[], &rows, None),
     };
     let column = |(at, role): (usize, &&'static str)| match *role {
         "accel_x" => "ax",

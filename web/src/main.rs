@@ -19,7 +19,7 @@ use mimu::calibration::Calibration;
 use mimu::prepared::Prepared;
 use mimu::signal::stillness::{DwellSearch, STILL_FACTOR, Steps};
 use mimu_recording::error::{Error, Result};
-use mimu_recording::look::{Guess, Units, guess};
+use mimu_recording::look::{Guess, Units, guess_preview};
 use mimu_recording::{ColumnList, Preset, Preview, Recording, preview};
 use serde::Serialize;
 
@@ -27,8 +27,6 @@ use serde::Serialize;
 const SHOWN: usize = 4;
 /// Rows of a file by which its units are judged: ten minutes at 100 Hz, and a minute at 1 kHz.
 const JUDGED: usize = 60_000;
-/// Rows at its beginning by which the roles of its columns are guessed.
-const NAMED: usize = 200;
 
 fn main() -> ExitCode {
     let args: Vec<String> = std::env::args().collect();
@@ -107,20 +105,9 @@ fn of_columns(paths: &[PathBuf]) -> Result<Dropped> {
     let (mut files, mut numbers) = (Vec::new(), Vec::new());
     for (k, path) in paths.iter().enumerate() {
         let mut preview = preview(path, None, JUDGED)?;
-        let number = |cell: &String| cell.replacen(',', ".", 1).parse().unwrap_or(f64::NAN);
-        let rows = preview.rows.iter();
-        let rows: Vec<Vec<f64>> = rows.map(|row| row.iter().map(number).collect()).collect();
-        preview.rows.truncate(SHOWN);
         let file = path.file_name().unwrap_or_default().to_string_lossy();
-        let mut guess = match preview.log {
-            true => Guess::default(),
-            false => guess(
-                &file,
-                &preview.names,
-                &preview.units,
-                &rows[..rows.len().min(NAMED)],
-            ),
-        };
+        let (mut guess, rows) = guess_preview(&file, &preview);
+        preview.rows.truncate(SHOWN);
         if let Some(list) = chosen.as_ref().and_then(|chosen| chosen.columns.get(k)) {
             guess.roles = roles(list, &preview.names);
         }

@@ -137,6 +137,14 @@ impl Line {
             .collect()
     }
 
+    /// The names of the numbers, if each has one.
+    pub fn names(&self) -> Option<Vec<String>> {
+        let named = self.named().into_iter().skip(self.time.iter().count());
+        named
+            .map(|(_, name, _)| (!name.is_empty()).then_some(name))
+            .collect()
+    }
+
     /// Key, name and text of each number, the time first. A label before several axes, as in `ACC: X=1,Y=2,Z=3`, or before three numbers belongs to each
     /// of them, `a/g` to three each; a unit behind the last belongs to all. The name is empty where labels do not distinguish the numbers.
     fn named(&self) -> Vec<(String, String, &str)> {

@@ -3,6 +3,8 @@
 use std::fmt;
 use std::str::FromStr;
 
+use serde::{Serialize, Serializer};
+
 use crate::cell::shorten;
 use crate::error::{Error, Result};
 
@@ -165,6 +167,12 @@ impl FromStr for Separator {
                 )
             }),
         }
+    }
+}
+
+impl Serialize for Separator {
+    fn serialize<S: Serializer>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
     }
 }
 

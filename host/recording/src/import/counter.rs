@@ -37,11 +37,23 @@ pub(super) struct StampCounter {
     last: Option<i64>,
     interval: i64,
     before: i64,
+    restarted: bool,
+    /// How often the logger started again.
+    pub restarts: u64,
     /// How often they wrapped.
     pub wraps: u64,
 }
 
+/// Intervals between the last row before a restart and the first one behind it, if the clock started again: nobody knows how long it stood still.
+const RESTART_INTERVALS: i64 = 100;
+
 impl StampCounter {
+    /// The logger has started again before the next row.
+    pub fn restart(&mut self) {
+        self.restarted = true;
+        self.restarts += 1;
+    }
+
     /// Whether there was a stamp that is later than 0.
     pub fn has_begun(&self) -> bool {
         self.last.is_some_and(|last| last > 0)
@@ -55,7 +67,9 @@ impl StampCounter {
         let wrapped = |size: &i64| {
             last < *size && (1..=NEAR_INTERVALS * self.interval).contains(&step(*size))
         };
-        if whole < last
+        if std::mem::take(&mut self.restarted) && whole < last {
+            self.before += last - whole + RESTART_INTERVALS * self.interval.max(1);
+        } else if whole < last
             && let Some(size) = STAMP_SIZES.into_iter().find(wrapped)
         {
             self.before += size;

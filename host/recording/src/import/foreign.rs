@@ -112,6 +112,9 @@ struct Cell {
     conversion: Conversion,
 }
 
+/// Pause that stands for the unknown one of a logger that started again, if its rows have no times, s.
+const PAUSE_S: f64 = 1.0;
+
 /// Where the time of a row comes from.
 #[derive(Debug, Clone, Copy)]
 enum TimeSource {
@@ -316,6 +319,14 @@ impl ForeignFile {
         [chosen, left_out + self.outside]
     }
 
+    /// Lines of words among its rows so far, and the first of them.
+    pub fn restarts(&self) -> Option<(u64, u64)> {
+        match &self.table {
+            Table::Text(table) => table.restarts,
+            Table::Parquet(_) | Table::Log(_) => None,
+        }
+    }
+
     /// Zero bytes around its lines so far.
     pub fn zero_bytes(&self) -> u64 {
         match &self.table {
@@ -423,6 +434,7 @@ impl ForeignFile {
     }
 
     fn read(&mut self, row: &mut Row) -> std::result::Result<bool, Unreadable> {
+        let restarts = self.restarts();
         let number = match &mut self.table {
             Table::Text(table) => table.next(&mut self.cells)?,
             Table::Parquet(table) => table.next(&mut self.cells)?,
@@ -431,12 +443,17 @@ impl ForeignFile {
         let Some(number) = number else {
             return Ok(false);
         };
+        if self.restarts() != restarts {
+            self.stamps.restart();
+        }
         let at = |path: &Path| format!("{}, row {number}", path.display());
         let time = match self.source {
             TimeSource::Stamp => self.cells.stamp.value,
             TimeSource::Sample(cell) => self.cells.numbers[cell],
             // A broken row was a sample too, and took its time.
-            TimeSource::Rows(rate) => self.broken.rows as f64 / rate,
+            TimeSource::Rows(rate) => {
+                self.broken.rows as f64 / rate + PAUSE_S * self.stamps.restarts as f64
+            }
         };
         if time.is_nan() || !is_reading(time) {
             let refusal = match time.is_nan() {

@@ -13,7 +13,7 @@ use super::text_table::split;
 use crate::cell;
 use crate::csv_file::BOM;
 use crate::error::{Error, Result};
-use crate::labelled::{Samples, UNITS};
+use crate::labelled::{Line, Samples, UNITS};
 use crate::separator::Separator;
 
 /// Bytes that are read at the start for each row: a longer row is rare.
@@ -29,7 +29,7 @@ pub struct Preview {
     /// Units in a line of their own below the names; empty if there is none.
     pub units: Vec<String>,
     /// The separator, if it is one that an import does not recognise: labels among the numbers.
-    #[serde(skip)]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub separator: Option<Separator>,
     /// The first rows, cell by cell, as they are written.
     pub rows: Vec<Vec<String>>,
@@ -90,8 +90,11 @@ fn table_or_labelled(
         Some(Separator::Labels) => labelled(lines, most),
         Some(_) => table,
         None if table.as_ref().is_some_and(is_table) => table,
-        // Without names, labels are as good as words in cells.
         None => {
+            // Without names, labels are as good as words in cells of their own, but not with a number in the same cell.
+            let glued =
+                |cell: &String| Line::parse(cell).is_some_and(|line| !line.labels().is_empty());
+            let table = table.filter(|table| !table.rows.iter().flatten().any(glued));
             let found = labelled(lines, most);
             let named = found.as_ref().is_some_and(|found| !found.names.is_empty());
             if named { found } else { table.or(found) }
@@ -102,7 +105,7 @@ fn table_or_labelled(
 /// Whether a label and more stand in the cell, as in `acc: 1`. A time of day does not begin with a letter.
 fn begins_with_label(cell: &str) -> bool {
     let cell = cell.trim();
-    let part = |c: char| c.is_alphanumeric() || "/_. ".contains(c);
+    let part = |c: char| c.is_alphanumeric() || "/_. ()".contains(c);
     let rest = cell.trim_start_matches(part);
     cell.starts_with(char::is_alphabetic) && rest.starts_with([':', '='])
 }
@@ -146,41 +149,58 @@ fn of_lines(lines: &[&[u8]], separator: Option<Separator>, most: usize) -> Optio
         Some(names) if is_units(&nearest) => (names, nearest),
         _ => (nearest, Vec::new()),
     };
-    let begins = cells(lines[first]).swap_remove(0);
-    if let Some((_, fields)) = SENTENCES.iter().find(|(sentence, _)| *sentence == begins) {
-        names = std::iter::once("")
-            .chain(fields.split(','))
-            .map(str::to_owned)
-            .collect();
+    let fixed = fixed_fields(&cells(lines[first]));
+    let known = fixed.is_some();
+    if let Some(fields) = fixed {
+        names = fields.split(',').map(str::to_owned).collect();
     }
     let rows = lines[first..].iter().filter(|line| is_row(line));
     Some(Preview {
         names,
         units,
         rows: rows.take(most).map(|line| cells(line)).collect(),
+        separator: known.then_some(separator),
         ..Preview::default()
     })
 }
 
-/// Fields of the messages of VectorNav's units, by the manual of the VN-100 (asynchronous output, ASCII).
+/// Fields of messages that have no header, by what a line begins with: those of VectorNav's units by the manual of the VN-100 (asynchronous output,
+/// ASCII).
 const SENTENCES: [(&str, &str); 4] = [
     (
         "$VNYMR",
-        "yaw,pitch,roll,mag_x,mag_y,mag_z,accel_x [m/s²],accel_y [m/s²],accel_z [m/s²],gyro_x [rad/s],gyro_y [rad/s],gyro_z [rad/s]",
+        "-,yaw,pitch,roll,mag_x,mag_y,mag_z,accel_x [m/s²],accel_y [m/s²],accel_z [m/s²],gyro_x [rad/s],gyro_y [rad/s],gyro_z [rad/s]",
     ),
     (
         "$VNQMR",
-        "qx,qy,qz,qw,mag_x,mag_y,mag_z,accel_x [m/s²],accel_y [m/s²],accel_z [m/s²],gyro_x [rad/s],gyro_y [rad/s],gyro_z [rad/s]",
+        "-,qx,qy,qz,qw,mag_x,mag_y,mag_z,accel_x [m/s²],accel_y [m/s²],accel_z [m/s²],gyro_x [rad/s],gyro_y [rad/s],gyro_z [rad/s]",
     ),
     (
         "$VNMAR",
-        "mag_x,mag_y,mag_z,accel_x [m/s²],accel_y [m/s²],accel_z [m/s²],gyro_x [rad/s],gyro_y [rad/s],gyro_z [rad/s]",
+        "-,mag_x,mag_y,mag_z,accel_x [m/s²],accel_y [m/s²],accel_z [m/s²],gyro_x [rad/s],gyro_y [rad/s],gyro_z [rad/s]",
     ),
     (
         "$VNIMU",
-        "mag_x,mag_y,mag_z,accel_x [m/s²],accel_y [m/s²],accel_z [m/s²],gyro_x [rad/s],gyro_y [rad/s],gyro_z [rad/s],temp_c,pressure",
+        "-,mag_x,mag_y,mag_z,accel_x [m/s²],accel_y [m/s²],accel_z [m/s²],gyro_x [rad/s],gyro_y [rad/s],gyro_z [rad/s],temp_c,pressure",
     ),
 ];
+/// Fields of a `sensor_msgs/msg/Imu` as `ros2 topic echo --csv` writes them, up to the readings that count.
+const ROS2_ECHO: &str = "sec,nanosec,frame_id,orientation.x,orientation.y,orientation.z,orientation.w,-,-,-,-,-,-,-,-,-,\
+    angular_velocity.x,angular_velocity.y,angular_velocity.z,-,-,-,-,-,-,-,-,-,\
+    linear_acceleration.x,linear_acceleration.y,linear_acceleration.z,-,-,-,-,-,-,-,-,-";
+
+/// Names of the cells of a row of a format without a header.
+fn fixed_fields(row: &[String]) -> Option<&'static str> {
+    let sentence = SENTENCES.iter().find(|(sentence, _)| *sentence == row[0]);
+    let words = |at: usize| {
+        row.get(at)
+            .is_some_and(|cell| cell::number(cell.as_bytes()).is_err())
+    };
+    let echo = row.len() == ROS2_ECHO.split(',').count() && words(2) && !words(0) && !words(1);
+    sentence
+        .map(|(_, fields)| *fields)
+        .or(echo.then_some(ROS2_ECHO))
+}
 
 /// Whether a line of words is one of units, below the names: short words, or brackets.
 fn is_units(row: &[String]) -> bool {

@@ -7,6 +7,7 @@ use super::foreign::ForeignFile;
 use super::options::file_name;
 use super::preset::PresetUse;
 use super::time::TimeSummary;
+use crate::digits::plural;
 
 /// Lines of the source files that contained no row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
@@ -74,6 +75,12 @@ impl ImportSummary {
         let warnings = found.map(|found| format!("{place}: {found}"));
         self.warnings.extend(warnings);
         self.padding += file.seen.padding();
+        if let Some((lines, first)) = file.restarts() {
+            self.warnings.push(format!(
+                "{place}: {} of words among the rows, the first in row {first}, left out: the logger started again there, and its bias may have changed; if its clock started again too, the pause is unknown",
+                plural(lines, "line")
+            ));
+        }
         if file.zero_bytes() > 0 {
             self.warnings.push(format!(
                 "{place}: {} bytes of 0 before and after its lines were left out: reserved space that was never written",

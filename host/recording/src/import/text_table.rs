@@ -57,11 +57,11 @@ pub(super) struct TextTable {
     line_number: u64,
     /// Line of the first row.
     first_row: u64,
-    /// The line of words above it, if rows have a time: a logger that starts again writes it once more, and the times show how long it stood still.
-    header: Vec<u8>,
     bytes: u64,
     length: u64,
     record: csv::ByteRecord,
+    /// Lines of words among the rows, and the first of them: a logger that starts again writes its header or greeting once more.
+    pub restarts: Option<(u64, u64)>,
     /// Whether its times are dates or times of day, which are in s.
     pub calendar: bool,
     pub skipped: SkippedLines,
@@ -208,10 +208,10 @@ impl TextTable {
             line: Vec::new(),
             line_number: 0,
             first_row: 0,
-            header: Vec::new(),
             bytes: 0,
             length,
             record: csv::ByteRecord::new(),
+            restarts: None,
             calendar: false,
             skipped: SkippedLines::default(),
             zero_bytes: 0,
@@ -281,14 +281,16 @@ impl TextTable {
             match kind(&self.line, self.comments) {
                 Kind::Blank => self.skipped.blank += 1,
                 Kind::Comment => self.skipped.comment += 1,
-                Kind::Other if !self.header.is_empty() && self.line == self.header => {
-                    self.skipped.header += 1;
-                }
                 Kind::Other => {
                     split(self.separator, &self.line, &mut self.record);
                     // Spreadsheets end with rows of nothing but separators.
                     if self.record.iter().all(<[u8]>::is_empty) {
                         self.skipped.blank += 1;
+                        continue;
+                    }
+                    if ended && self.is_words() {
+                        self.skipped.header += 1;
+                        self.restarts.get_or_insert((0, number)).0 += 1;
                         continue;
                     }
                     if !self.filters.keep(&self.filtered, &self.record) {
@@ -339,6 +341,7 @@ impl TextTable {
                     }
                     Taken::Words => {
                         self.skipped.header += 1;
+                        self.restarts.get_or_insert((0, number)).0 += 1;
                         None
                     }
                     Taken::Damaged => {
@@ -486,6 +489,18 @@ impl TextTable {
         Ok(())
     }
 
+    /// Whether the line has words in place of the readings: a header or a greeting.
+    fn is_words(&self) -> bool {
+        let count = |is: fn(&u8) -> bool| self.line.iter().filter(|byte| is(byte)).count();
+        let words = count(u8::is_ascii_alphabetic) > count(u8::is_ascii_digit);
+        let no_number = |cell: &[u8]| cell.is_empty() || self.number(cell).is_err();
+        let short = self.record.len() < self.width;
+        let mut wanted = self.wanted.iter().map(|(position, _)| position);
+        words
+            && self.record.iter().all(no_number)
+            && (short || wanted.any(|position| !self.record[*position].is_empty()))
+    }
+
     /// What is wrong with the width of a row.
     fn misfit(&self, record: &csv::ByteRecord, ended: bool) -> Option<Refusal> {
         let cells = record.len();
@@ -538,12 +553,6 @@ impl TextTable {
                     split(self.separator, line, &mut record);
                     if self.take_line(&record, list, number, &mut search)? {
                         self.first_row = search.left_out.unwrap_or(number);
-                        let above = lines[..self.first_row as usize - 1].iter().rev();
-                        let mut words =
-                            above.filter(|l| matches!(kind(l, self.comments), Kind::Other));
-                        let timed = self.roles().contains(&Role::Column(Column::Time));
-                        let words = words.next().filter(|_| timed).map_or(&b""[..], |l| l);
-                        self.header = words.strip_suffix(b"\r").unwrap_or(words).to_vec();
                         return Ok(());
                     }
                 }

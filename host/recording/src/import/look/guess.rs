@@ -6,7 +6,8 @@
 use serde::Serialize;
 
 use super::names::{
-    Meaning, clock_unit, clock_unit_within, force_unit, is_other, meaning, rate_unit,
+    Meaning, are_seconds_of, clock_unit, clock_unit_within, force_unit, is_other, meaning,
+    rate_unit,
 };
 use crate::RAW_COLUMNS;
 use crate::import::time::Decimal;
@@ -36,16 +37,26 @@ pub struct Guess {
 const GYRO: [&str; 3] = ["gyro_x", "gyro_y", "gyro_z"];
 const ACCEL: [&str; 3] = ["accel_x", "accel_y", "accel_z"];
 
-/// Guesses the columns of the file called `file` from these names, the units in a row of their own, and the first rows.
-pub fn guess(file: &str, names: &[String], units: &[String], rows: &[Vec<f64>]) -> Guess {
+/// Guesses the columns of the file called `file` from these names, the units in a row of their own, and the first rows; `clock` is the column of dates or
+/// times of day.
+pub fn guess(
+    file: &str,
+    names: &[String],
+    units: &[String],
+    rows: &[Vec<f64>],
+    clock: Option<usize>,
+) -> Guess {
     let width = rows.first().map_or(names.len(), Vec::len);
     let mut guess = match names.is_empty() {
-        true => by_readings(file, width, rows),
+        true => by_readings(file, width, rows, clock),
         false => by_names(file, names),
     };
     let time = ["t_s", "sample"];
     if !guess.roles.iter().any(|role| time.contains(role)) {
-        take_growing(&mut guess, names, rows);
+        match clock.filter(|at| guess.roles[*at] == "-") {
+            Some(at) => guess.roles[at] = "t_s",
+            None => take_growing(&mut guess, names, rows),
+        }
     }
     // Codes of a thermometer are not in °C, and are worse than no temperature.
     let implausible = |at: usize| {
@@ -129,6 +140,17 @@ fn by_names(file: &str, names: &[String]) -> Guess {
         // Of two sensors or two clocks, the first is used.
         roles.push(if roles.contains(&role) { "-" } else { role });
     }
+    // Beside them are the seconds of the same stamp: bagpy's `Time` is when the message was received.
+    if let Some(at) = roles.iter().position(|role| *role == "t_ns")
+        && let Some(seconds) = names
+            .iter()
+            .position(|name| are_seconds_of(name, &names[at]))
+    {
+        for role in roles.iter_mut().filter(|role| **role == "t_s") {
+            *role = "-";
+        }
+        roles[seconds] = "t_s";
+    }
     // Nanoseconds of their own, without seconds, are the whole time.
     if let Some(at) = roles.iter().position(|role| *role == "t_ns")
         && !roles.contains(&"t_s")
@@ -172,7 +194,7 @@ pub(super) fn grows_evenly(rows: &[Vec<f64>], at: usize) -> bool {
 const MOST_COLUMNS: usize = 24;
 
 /// Without names: the time, and the first two triads.
-fn by_readings(file: &str, width: usize, rows: &[Vec<f64>]) -> Guess {
+fn by_readings(file: &str, width: usize, rows: &[Vec<f64>], clock: Option<usize>) -> Guess {
     let column = |at: usize| {
         rows.iter()
             .map(move |row| row.get(at).copied().unwrap_or(f64::NAN))
@@ -192,7 +214,9 @@ fn by_readings(file: &str, width: usize, rows: &[Vec<f64>]) -> Guess {
     let is_number =
         |at: &usize| 10 * column(*at).filter(|v| v.is_finite()).count() >= 9 * rows.len();
     let numbers: Vec<usize> = (0..width).filter(is_number).collect();
-    let time = numbers.iter().position(|&at| grows(at));
+    let time = numbers
+        .iter()
+        .position(|&at| clock.map_or_else(|| grows(at), |clock| at == clock));
     let behind = &numbers[time.map_or(0, |k| k + 1)..];
     if let Some(k) = time {
         roles[numbers[k]] = "t_s";
@@ -291,7 +315,7 @@ mod tests {
 
     fn roles(names: &[&str]) -> Vec<&'static str> {
         let names: Vec<String> = names.iter().map(|n| n.to_string()).collect();
-        guess("log.csv", &names, &[], &[]).roles
+        guess("log.csv", &names, &[], &[], None).roles
     }
 
     const ALL: [&str; 7] = [
@@ -354,7 +378,13 @@ mod tests {
     #[test]
     fn the_codes_of_a_thermometer_are_not_taken_for_degrees() {
         let names = ["time", "dTemp", "Temp", "gyrox rad/s"].map(String::from);
-        let found = guess("log.csv", &names, &[], &[vec![0.0, -8884.0, 31.2, 0.0]]);
+        let found = guess(
+            "log.csv",
+            &names,
+            &[],
+            &[vec![0.0, -8884.0, 31.2, 0.0]],
+            None,
+        );
         assert_eq!(found.roles, ["t_s", "-", "temp_c", "gyro_x"]);
     }
 
@@ -373,7 +403,7 @@ mod tests {
         let units = |gyro: f64, z: f64| {
             let row = |k: usize| vec![10.0 * k as f64, gyro, 0.0, -gyro, 0.0, 0.0, z];
             let rows: Vec<Vec<f64>> = (0..50).map(row).collect();
-            let found = guess("log.csv", &names, &[], &rows);
+            let found = guess("log.csv", &names, &[], &rows, None);
             assert_eq!(found.time_unit, Some(Decimal::Millisecond));
             Units::of(&[&found], &[rows]).known()
         };
@@ -396,8 +426,8 @@ mod tests {
         });
         let rows: Vec<Vec<Vec<f64>>> = vec![gyro.collect(), accel.collect()];
         let guesses = [
-            guess("gyro.txt", &[], &[], &rows[0]),
-            guess("acc.txt", &[], &[], &rows[1]),
+            guess("gyro.txt", &[], &[], &rows[0], None),
+            guess("acc.txt", &[], &[], &rows[1], None),
         ];
         let units = Units::of(&[&guesses[0], &guesses[1]], &rows);
         assert_eq!(units.known(), [Some("deg/s"), Some("m/s²")]);
@@ -408,7 +438,7 @@ mod tests {
         let rows: Vec<Vec<f64>> = (0..20)
             .map(|k| vec![0.01 * f64::from(k), 0.1, 0.2, 9.8, 0.01, -0.02, 0.01])
             .collect();
-        let found = guess("log.csv", &[], &[], &rows);
+        let found = guess("log.csv", &[], &[], &rows, None);
         assert_eq!(
             found.roles,
             [
@@ -418,7 +448,7 @@ mod tests {
         assert!(found.by_readings);
         let alone: Vec<Vec<f64>> = rows.iter().map(|row| row[..4].to_vec()).collect();
         assert_eq!(
-            guess("my_Gyro.txt", &[], &[], &alone).roles,
+            guess("my_Gyro.txt", &[], &[], &alone, None).roles,
             ["t_s", "gyro_x", "gyro_y", "gyro_z"]
         );
     }

@@ -6,6 +6,8 @@
 
 mod guess;
 mod names;
+#[cfg(test)]
+mod tests;
 
 use std::path::{Path, PathBuf};
 
@@ -16,7 +18,7 @@ pub use guess::{Guess, Units, guess};
 
 use self::names::{Meaning, meaning, unknown_triad};
 use super::assignment::{ColumnList, Role, Scale};
-use super::preview::preview;
+use super::preview::{Preview, preview};
 use super::time::{Decimal, Seen, Unit, calendar_time};
 use crate::error::{Error, Result};
 use crate::separator::Separator;
@@ -229,30 +231,11 @@ impl Look {
         let (mut looks, mut numbers) = (Vec::new(), Vec::new());
         for path in files {
             let seen = preview(path, separator, ROWS)?;
-            let mut rows: Vec<Vec<f64>> = seen
-                .rows
-                .iter()
-                .map(|row| row.iter().map(|cell| number(cell)).collect())
-                .collect();
             let file = path.file_name().unwrap_or_default().to_string_lossy();
-            let judged = &rows[..rows.len().min(JUDGED)];
-            let mut guess = guess(&file, &seen.names, &seen.units, judged);
-            guess.time_unit = given.time_unit.or(guess.time_unit);
-            // A date or a time of day is in s, whatever its name says.
-            let first = seen.rows.first();
-            let dated = |at: &usize| {
-                let cell = first.and_then(|row| row.get(*at));
-                cell.is_some_and(|cell| calendar_time(cell.as_bytes()).is_some())
-            };
-            let unused = |at: &usize| guess.roles[*at] == "-";
-            let time = guess.roles.iter().position(|role| *role == "t_s");
-            let time = time.or_else(|| (0..guess.roles.len()).filter(unused).find(dated));
-            if let Some(at) = time.filter(dated) {
-                guess.roles[at] = "t_s";
-                guess.time_unit = None;
-                guess.calendar = true;
+            let (mut guess, rows) = guess_preview(&file, &seen);
+            if !guess.calendar {
+                guess.time_unit = given.time_unit.or(guess.time_unit);
             }
-            join_times(&guess, &mut rows);
             looks.push(FileLook {
                 path: path.clone(),
                 names: seen.names,
@@ -650,6 +633,26 @@ impl Look {
     }
 }
 
+/// The roles of the columns of a file called `file`, and its numbers, in which the times go on.
+pub fn guess_preview(file: &str, seen: &Preview) -> (Guess, Vec<Vec<f64>>) {
+    let numbers = |row: &Vec<String>| row.iter().map(|cell| number(cell)).collect();
+    let mut rows: Vec<Vec<f64>> = seen.rows.iter().map(numbers).collect();
+    let is_clock = |cell: &String| calendar_time(cell.as_bytes()).is_some();
+    let clock = seen
+        .rows
+        .first()
+        .and_then(|row| row.iter().position(is_clock));
+    let judged = &rows[..rows.len().min(JUDGED)];
+    let mut guess = guess(file, &seen.names, &seen.units, judged, clock);
+    // A date or a time of day is in s, whatever its name says.
+    if clock.is_some_and(|at| guess.roles[at] == "t_s") {
+        guess.time_unit = None;
+        guess.calendar = true;
+    }
+    join_times(&guess, &mut rows);
+    (guess, rows)
+}
+
 /// The column that a name means by itself, if it is one of readings or of a thermometer: `AccX`, `wz`, `gyro_y`.
 pub fn column_named(name: &str) -> Option<Column> {
     match meaning(name) {
@@ -660,26 +663,27 @@ pub fn column_named(name: &str) -> Option<Column> {
     }
 }
 
-/// Makes the times of the rows go on: nanoseconds are added to seconds, and a time of day goes on over midnight.
+/// Makes the times of the rows go on: nanoseconds are added to seconds, and a clock goes on over midnight and where its logger started again.
 fn join_times(guess: &Guess, rows: &mut [Vec<f64>]) {
-    const DAY_S: f64 = 86_400.0;
+    /// Stamps that are handed over late go back by less than this many rows.
+    const BACK: f64 = 10.0;
     let at = |role: &str| guess.roles.iter().position(|r| *r == role);
     let Some(time) = at("t_s") else { return };
     let nanoseconds = at("t_ns");
-    let (mut before, mut days) = (f64::NEG_INFINITY, 0.0);
+    let (mut before, mut step, mut added) = (f64::NAN, 0.0, 0.0);
     for row in rows {
-        let added = nanoseconds.and_then(|at| row.get(at).copied());
+        let nanoseconds = nanoseconds.and_then(|at| row.get(at).copied());
         let Some(cell) = row.get_mut(time) else {
             continue;
         };
-        *cell += 1e-9 * added.unwrap_or(0.0);
-        if guess.calendar {
-            if *cell < before - 0.5 * DAY_S {
-                days += DAY_S;
-            }
-            before = *cell;
-            *cell += days;
+        *cell += 1e-9 * nanoseconds.unwrap_or(0.0) + added;
+        if before - *cell > BACK * step {
+            added += before + step - *cell;
+            *cell = before + step;
+        } else if *cell > before {
+            step = *cell - before;
         }
+        before = *cell;
     }
 }
 

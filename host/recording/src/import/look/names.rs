@@ -436,6 +436,17 @@ pub(super) fn meaning(name: &str) -> Meaning {
     }
 }
 
+/// Whether `name` has the seconds of the stamp whose nanoseconds are in `nanoseconds`: `header.stamp.secs` and `header.stamp.nsecs`.
+pub(super) fn are_seconds_of(name: &str, nanoseconds: &str) -> bool {
+    let [name, nanoseconds] = [name, nanoseconds].map(words);
+    match (name.split_last(), nanoseconds.split_last()) {
+        (Some((last, of)), Some((_, stamp))) => {
+            of == stamp && ["s", "sec", "secs", "second", "seconds"].contains(&last.as_str())
+        }
+        _ => false,
+    }
+}
+
 /// The axis of a rate that is named after its angle: `roll_rate`, MAVLink's `pitchspeed`.
 fn rate_of_an_angle(words: &[String]) -> Option<usize> {
     const RATE: [&str; 8] = [

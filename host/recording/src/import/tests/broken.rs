@@ -103,6 +103,43 @@ fn a_broken_row_of_a_file_without_times_takes_its_time() {
     assert_eq!((batch.t_s[39], batch.t_s[40]), (0.39, 0.41));
 }
 
+/// A logger that starts again writes its greeting and its header once more, and its clock begins at 0.
+#[test]
+fn a_header_and_a_greeting_among_the_rows_are_left_out_and_the_clock_goes_on() {
+    for (clock, columns) in [(true, NAMES), (false, "-,gyro_x,gyro_y,gyro_z")] {
+        let row = |i: usize| format!("{},{},{},{}\n", 10 * i, i % 7, i % 5, i % 3);
+        let part = |of: std::ops::Range<usize>| of.map(row).collect::<String>();
+        let again = if clock { part(2..102) } else { part(100..200) };
+        let text = format!("ms,x,y,z\n{}MPU6050 ready\nms,x,y,z\n{again}", part(0..100));
+        let (summary, batch, _) = one(&text, columns).unwrap();
+        assert_eq!((summary.rows, summary.skipped.header), (200, 3));
+        assert!(
+            warned(
+                &summary,
+                "2 lines of words among the rows, the first in row 102"
+            ),
+            "{summary:?}"
+        );
+        assert!(
+            batch.t_s.is_sorted() && batch.t_s[100] - batch.t_s[99] > 0.1,
+            "{:?}",
+            &batch.t_s[98..102]
+        );
+    }
+    // Words in one cell are a broken row.
+    assert!(one("10,1,2,3\n20,1,2,3\n30,ovf,2,3\n", NAMES).is_err());
+}
+
+/// Sentences in the manner of NMEA; the third has the checksum of the second.
+#[test]
+fn a_row_with_a_wrong_checksum_is_broken() {
+    let text = "$A,10,1,2,3*70\n$A,20,1,2,3*73\n$A,30,1,2,3*73\n$A,40,1,2,3*75\n";
+    let error = one(text, "-,t_s,gyro_x,gyro_y,gyro_z")
+        .unwrap_err()
+        .to_string();
+    assert!(error.contains("row 3: its checksum is wrong"), "{error}");
+}
+
 #[test]
 fn where_no_row_fits_the_first_line_of_data_is_named_with_what_is_wrong_with_it() {
     let rows = "0.01,1,2,3,4\n0.02,1,2,3,4\n0.03,1,2,3\n";
