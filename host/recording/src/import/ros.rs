@@ -5,6 +5,8 @@
 //! Drivers whose gyro and accelerometer have separate clocks publish two topics, each with one half of the message: the other half is 0, or its
 //! covariance begins with -1, which the definition of the message reserves for this.
 
+mod definition;
+
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::Read;
@@ -14,6 +16,7 @@ use super::readings::{Choice, Readings, guarded};
 use super::sqlite::Database;
 use crate::columns::Column;
 use crate::error::{Argument, Error, Result};
+use definition::Before;
 
 /// Bytes that are read at a time.
 const PIECE: usize = 1 << 18;
@@ -47,20 +50,25 @@ struct Topic {
     kind: String,
     /// `None` if the messages are of another kind or encoding.
     layout: Option<Layout>,
+    /// What stands before the `sensor_msgs/Imu` of a message that contains one.
+    before: Option<Before>,
 }
 
 impl Topic {
-    fn new(name: &str, kind: &str, encoding: &str) -> Self {
+    /// `definition` is that of the messages, if the file has it.
+    fn new(name: &str, kind: &str, encoding: &str, definition: &str) -> Self {
         let imu = ["sensor_msgs/Imu", "sensor_msgs/msg/Imu"].contains(&kind);
         let layout = match encoding {
             "ros1" => Some(Layout::Ros1),
             "cdr" => Some(Layout::Cdr),
             _ => None,
         };
+        let before = Before::of(kind, definition).filter(|_| !imu);
         Self {
             name: name.to_owned(),
             kind: kind.to_owned(),
-            layout: layout.filter(|_| imu),
+            layout: layout.filter(|_| imu || before.is_some()),
+            before,
         }
     }
 }
@@ -79,13 +87,14 @@ impl Found {
         let Some(Topic {
             name,
             layout: Some(layout),
+            before,
             ..
         }) = self.topics.get(&topic)
         else {
             return;
         };
         let messages = self.messages.entry(topic).or_default();
-        match parse(data, *layout) {
+        match parse(data, *layout, before.as_ref()) {
             Some(imu) => messages.push(Imu { received_ns, ..imu }),
             None => {
                 let number = messages.len() + 1;
@@ -111,8 +120,16 @@ fn chosen(path: &Path, mut found: Found, choice: Choice<'_>) -> Result<Vec<Readi
     let several = numbers.len() > 1;
     let each = numbers.iter().map(|number| {
         let messages = found.messages.remove(number).unwrap_or_default();
-        let name = &found.topics[number].name;
-        readings(name, &messages, several)
+        let topic = &found.topics[number];
+        let mut readings = readings(&topic.name, &messages, several);
+        if topic.before.is_some() {
+            let note = format!(
+                "{}: the sensor_msgs/Imu within {} is read",
+                topic.name, topic.kind
+            );
+            readings.notes.push(note);
+        }
+        readings
     });
     let mut all: Vec<Readings> = each.collect();
     // The others are interpolated at the times of the first.
@@ -269,7 +286,12 @@ fn messages_of_bag(path: &Path) -> Result<Found> {
     let mut found = Found::default();
     for record in bag.index_records() {
         if let IndexRecord::Connection(connection) = record.map_err(damaged)? {
-            let topic = Topic::new(connection.storage_topic, connection.tp, "ros1");
+            let topic = Topic::new(
+                connection.storage_topic,
+                connection.tp,
+                "ros1",
+                connection.message_definition,
+            );
             found.topics.insert(connection.id, topic);
         }
     }
@@ -326,7 +348,7 @@ fn messages_of_mcap(path: &Path) -> Result<Found> {
     let options = LinearReaderOptions::default().with_record_length_limit(LONGEST_RECORD);
     let mut reader = LinearReader::new_with_options(options);
     let mut found = Found::default();
-    let mut schemas: BTreeMap<u16, String> = BTreeMap::new();
+    let mut schemas: BTreeMap<u16, (String, String)> = BTreeMap::new();
     while let Some(event) = reader.next_event() {
         match event.map_err(damaged)? {
             LinearReadEvent::ReadRequest(wanted) => {
@@ -336,12 +358,15 @@ fn messages_of_mcap(path: &Path) -> Result<Found> {
             }
             LinearReadEvent::Record { data, opcode } => {
                 match mcap::parse_record(opcode, data).map_err(damaged)? {
-                    Record::Schema { header, .. } => {
-                        schemas.insert(header.id, header.name);
+                    Record::Schema { header, data } => {
+                        let definition = String::from_utf8_lossy(&data).into_owned();
+                        schemas.insert(header.id, (header.name, definition));
                     }
                     Record::Channel(channel) => {
-                        let kind = schemas.get(&channel.schema_id).map_or("", String::as_str);
-                        let topic = Topic::new(&channel.topic, kind, &channel.message_encoding);
+                        let none = Default::default();
+                        let (kind, definition) = schemas.get(&channel.schema_id).unwrap_or(&none);
+                        let encoding = &channel.message_encoding;
+                        let topic = Topic::new(&channel.topic, kind, encoding, definition);
                         found.topics.insert(u32::from(channel.id), topic);
                     }
                     Record::Message { header, data } => {
@@ -386,8 +411,20 @@ fn messages_of_database(path: &Path) -> std::result::Result<Found, String> {
     let columns = ["id", "name", "type", "serialization_format"].map(|name| topics.column(name));
     let [id, name, kind, encoding] = columns;
     let (id, name, kind, encoding) = (id?, name?, kind?, encoding?);
+    // From Iron on.
+    let mut definitions: BTreeMap<String, String> = BTreeMap::new();
+    if let Some(table) = tables.get("message_definitions") {
+        let of = table.column("topic_type")?;
+        let text = table.column("encoded_message_definition")?;
+        database.each_row(table, |row| {
+            definitions.insert(row.text(of)?, row.text(text)?);
+            Ok(())
+        })?;
+    }
     database.each_row(topics, |row| {
-        let topic = Topic::new(&row.text(name)?, &row.text(kind)?, &row.text(encoding)?);
+        let kind = row.text(kind)?;
+        let definition = definitions.get(&kind).map_or("", String::as_str);
+        let topic = Topic::new(&row.text(name)?, &kind, &row.text(encoding)?, definition);
         let number = u32::try_from(row.integer(id)?).map_err(|_| "a topic has no number")?;
         found.topics.insert(number, topic);
         Ok(())
@@ -432,8 +469,28 @@ impl Fields<'_> {
         Some(taken)
     }
 
+    /// Passes a text.
+    fn text(&mut self) -> Option<()> {
+        let length = self.u32()? as usize;
+        self.at = self.at.checked_add(length)?;
+        Some(())
+    }
+
     fn u32(&mut self) -> Option<u32> {
         self.take().map(u32::from_le_bytes)
+    }
+
+    /// The stamp of a header.
+    fn stamp_ns(&mut self, layout: Layout) -> Option<i64> {
+        if layout == Layout::Ros1 {
+            self.u32()?; // seq
+        }
+        let (seconds, nanoseconds) = (self.u32()?, self.u32()?);
+        let seconds = match layout {
+            Layout::Ros1 => i64::from(seconds),
+            Layout::Cdr => i64::from(seconds.cast_signed()),
+        };
+        Some(seconds * 1_000_000_000 + i64::from(nanoseconds))
     }
 
     fn f64s<const N: usize>(&mut self) -> Option<[f64; N]> {
@@ -445,11 +502,11 @@ impl Fields<'_> {
     }
 }
 
-/// A message; `None` if it is cut.
-fn parse(data: &[u8], layout: Layout) -> Option<Imu> {
+/// A message, or the one behind the fields `before`; `None` if it is cut.
+fn parse(data: &[u8], layout: Layout, before: Option<&Before>) -> Option<Imu> {
     let mut fields = match layout {
         Layout::Ros1 => Fields {
-            bytes: data.get(4..)?, // seq
+            bytes: data,
             at: 0,
             big_endian: false,
             aligned: false,
@@ -461,20 +518,23 @@ fn parse(data: &[u8], layout: Layout) -> Option<Imu> {
             aligned: true,
         },
     };
-    let (seconds, nanoseconds) = (fields.u32()?, fields.u32()?);
-    let seconds = match layout {
-        Layout::Ros1 => i64::from(seconds),
-        Layout::Cdr => i64::from(seconds.cast_signed()),
-    };
-    let frame = fields.u32()? as usize;
-    fields.at = fields.at.checked_add(frame)?;
+    let mut outer_ns = 0;
+    if let Some(before) = before {
+        if before.header {
+            outer_ns = fields.stamp_ns(layout)?;
+            fields.at = 0;
+        }
+        before.pass(&mut fields)?;
+    }
+    let stamp_ns = fields.stamp_ns(layout)?;
+    fields.text()?; // frame
     fields.f64s::<{ 4 + 9 }>()?;
     let [rx, ry, rz] = fields.f64s()?;
     let [of_rate, ..] = fields.f64s::<9>()?;
     let [ax, ay, az] = fields.f64s()?;
     let of_force = fields.f64s::<9>().map_or(0.0, |covariance| covariance[0]);
     Some(Imu {
-        stamp_ns: seconds * 1_000_000_000 + i64::from(nanoseconds),
+        stamp_ns: if stamp_ns == 0 { outer_ns } else { stamp_ns },
         received_ns: 0,
         absent: [of_rate, of_force].map(|first| first == -1.0),
         values: [rx, ry, rz, ax, ay, az],
