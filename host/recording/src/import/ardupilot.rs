@@ -2,7 +2,8 @@
 //!
 //! `IMU` contains the readings of sensor number `I` at the rate of the main loop or below, `GYR` and `ACC` those at the sensor's own rate. All are
 //! calibrated and rotated to the vehicle's axes: `R ((raw - INS_ACCOFFS) INS_ACCSCAL)` and `R (raw - INS_GYROFFS)`, with R given by
-//! `AHRS_ORIENTATION` (`_rotate_and_correct_accel` of AP_InertialSensor_Backend). `IMT` contains the same readings, integrated over an interval.
+//! `AHRS_ORIENTATION` (`_rotate_and_correct_accel` of AP_InertialSensor_Backend). Before version 3.3, whose logs count ms (`TimeMS`), the readings were
+//! calibrated on the vehicle's axes: `INS_ACCSCAL (R raw) - INS_ACCOFFS` (`_rotate_and_offset_accel`). `IMT` contains the same readings, integrated over an interval.
 
 mod records;
 
@@ -96,10 +97,10 @@ impl Log {
             self.stale = false;
         }
         let parameters = &self.parameters;
-        let correction = self
-            .corrections
-            .entry(instance)
-            .or_insert_with(|| corrections(parameters, instance));
+        let correction = self.corrections.entry(instance).or_insert_with(|| {
+            let in_vehicle = record.number("TimeMS").is_some();
+            corrections(parameters, instance, in_vehicle)
+        });
         let samples = self.samples.entry((kind, instance)).or_default();
         samples.take(kind, record, correction.as_ref());
     }
@@ -210,7 +211,8 @@ impl Samples {
         };
         let time = record
             .number("SampleUS")
-            .or_else(|| record.number("TimeUS"))?;
+            .or_else(|| record.number("TimeUS"))
+            .or_else(|| Some(1e3 * record.number("TimeMS")?))?;
         let (gyro, accel) = match kind {
             "GYR" => (Some(three(["GyrX", "GyrY", "GyrZ"])?), None),
             "ACC" => (None, Some(three(["AccX", "AccY", "AccZ"])?)),
@@ -295,7 +297,11 @@ impl Samples {
 }
 
 /// ArduPilot's calibration of gyro and accelerometer number `instance`; `None` if the log does not contain it.
-fn corrections(parameters: &BTreeMap<String, f64>, instance: u32) -> Option<[Correction; 2]> {
+fn corrections(
+    parameters: &BTreeMap<String, f64>,
+    instance: u32,
+    in_vehicle: bool,
+) -> Option<[Correction; 2]> {
     // Parameters of sensors 2 and 3 have the number within the name, those of further sensors before it.
     let (before, within) = match instance {
         0 => ("INS".to_owned(), String::new()),
@@ -318,11 +324,13 @@ fn corrections(parameters: &BTreeMap<String, f64>, instance: u32) -> Option<[Cor
             rotation,
             offset: three(&format!("GYR{within}OFFS"))?,
             scale: [1.0; 3],
+            in_vehicle,
         },
         Correction {
             rotation,
             offset: accel,
             scale,
+            in_vehicle,
         },
     ])
 }

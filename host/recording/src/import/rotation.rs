@@ -81,15 +81,29 @@ pub(super) struct Correction {
     pub rotation: Rotation,
     pub offset: [f64; 3],
     pub scale: [f64; 3],
+    /// Whether it was applied in another order: `scale (rotation raw) - offset`, on the vehicle's axes.
+    pub in_vehicle: bool,
 }
 
 impl Correction {
     /// The reading before this calibration.
     pub fn undo(&self, reading: [f64; 3]) -> [f64; 3] {
-        std::array::from_fn(|i| {
-            let in_sensor: f64 = (0..3).map(|k| self.rotation[k][i] * reading[k]).sum();
-            in_sensor / self.scale[i] + self.offset[i]
-        })
+        let Self {
+            rotation,
+            offset,
+            scale,
+            ..
+        } = self;
+        let in_sensor = |vehicle: [f64; 3]| -> [f64; 3] {
+            std::array::from_fn(|i| (0..3).map(|k| rotation[k][i] * vehicle[k]).sum())
+        };
+        match self.in_vehicle {
+            true => in_sensor(std::array::from_fn(|i| (reading[i] + offset[i]) / scale[i])),
+            false => {
+                let scaled = in_sensor(reading);
+                std::array::from_fn(|i| scaled[i] / scale[i] + offset[i])
+            }
+        }
     }
 }
 
@@ -119,21 +133,32 @@ mod tests {
 
     #[test]
     fn undone_is_what_was_there_before() {
-        let correction = Correction {
+        let mut correction = Correction {
             rotation: product(&from_euler([3.0, -2.0, 7.0]), &orientation(38.0).unwrap()),
             offset: [0.1, -0.2, 0.3],
             scale: [1.02, 0.97, 1.0],
+            in_vehicle: false,
         };
         let raw = [1.0, 2.0, -9.0];
-        let scaled: [f64; 3] =
-            std::array::from_fn(|i| (raw[i] - correction.offset[i]) * correction.scale[i]);
-        let done = correction
-            .rotation
-            .map(|row| (0..3).map(|k| row[k] * scaled[k]).sum::<f64>());
-        let undone = correction.undo(done);
-        assert!(
-            (0..3).all(|i| (undone[i] - raw[i]).abs() < 1e-12),
-            "{undone:?}"
-        );
+        let rotated = |three: [f64; 3]| -> [f64; 3] {
+            correction
+                .rotation
+                .map(|row| (0..3).map(|k| row[k] * three[k]).sum::<f64>())
+        };
+        let [offset, scale] = [correction.offset, correction.scale];
+        let scaled = std::array::from_fn(|i| (raw[i] - offset[i]) * scale[i]);
+        let turned = rotated(raw);
+        let both = [
+            rotated(scaled),
+            std::array::from_fn(|i| turned[i] * scale[i] - offset[i]),
+        ];
+        for (in_vehicle, done) in [false, true].into_iter().zip(both) {
+            correction.in_vehicle = in_vehicle;
+            let undone = correction.undo(done);
+            assert!(
+                (0..3).all(|i| (undone[i] - raw[i]).abs() < 1e-12),
+                "{undone:?}"
+            );
+        }
     }
 }

@@ -59,6 +59,70 @@ fn calibration_and_mounting_are_undone_by_the_parameters_of_the_time_of_each_rea
     }
 }
 
+/// A log of ArduCopter 3.1 with two sensors, on a board that is rolled over: scale factors and offsets are those of the vehicle's axes.
+fn before_3_3() -> Vec<u8> {
+    let filled = |text: &str, length: usize| {
+        let mut bytes = text.as_bytes().to_vec();
+        bytes.resize(length, 0);
+        bytes
+    };
+    let record =
+        |number: u8, parts: &[&[u8]]| [&[0xA3, 0x95, number][..], &parts.concat()].concat();
+    let format = |number: u8, length: u8, name: &str, kinds: &str, labels: &str| {
+        record(
+            128,
+            &[
+                &[number, length],
+                &filled(name, 4),
+                &filled(kinds, 16),
+                &filled(labels, 64),
+            ],
+        )
+    };
+    let fields = "TimeMS,GyrX,GyrY,GyrZ,AccX,AccY,AccZ";
+    let mut log = format(64, 23, "PARM", "Nf", "Name,Value");
+    log.extend(format(65, 31, "IMU", "Iffffff", fields));
+    log.extend(format(66, 31, "IMU2", "Iffffff", fields));
+    let mut parameter =
+        |name: &str, value: f32| log.extend(record(64, &[&filled(name, 16), &value.to_le_bytes()]));
+    parameter("AHRS_ORIENTATION", 8.0);
+    for (number, scale) in [("", 2.0), ("2", 0.5)] {
+        for axis in ["X", "Y", "Z"] {
+            parameter(&format!("INS_ACC{number}SCAL_{axis}"), scale);
+            parameter(&format!("INS_ACC{number}OFFS_{axis}"), 0.25);
+            parameter(&format!("INS_GYR{number}OFFS_{axis}"), 0.125);
+        }
+    }
+    for r in 0..20_u32 {
+        for (number, scale) in [(65, 2.0), (66, 0.5)] {
+            // Raw (0.5, r / 8, 1) rad/s and (r / 4, 1, -8) m/s²; y and z of the vehicle point against those of the board.
+            let r8 = r as f32 / 8.0;
+            let gyro = [0.5, -r8, -1.0].map(|rate: f32| rate - 0.125);
+            let accel = [2.0 * r8, -1.0, 8.0].map(|force: f32| force * scale - 0.25);
+            let values = gyro.into_iter().chain(accel).flat_map(f32::to_le_bytes);
+            log.extend(record(
+                number,
+                &[&(1000 + 20 * r).to_le_bytes(), &values.collect::<Vec<u8>>()],
+            ));
+        }
+    }
+    log
+}
+
+#[test]
+fn logs_before_3_3_count_milliseconds_and_were_calibrated_on_the_axes_of_the_vehicle() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("log.bin");
+    std::fs::write(&path, before_3_3()).unwrap();
+    for instance in [0, 1] {
+        let mut all = open(&path, None, Some(instance)).unwrap();
+        assert!(all[0].warnings.is_empty(), "{:?}", all[0].warnings);
+        let rows = rows(&mut all[0]);
+        assert_eq!((rows.len(), rows[3].0), (20, Stamp::from(1_060_000_000)));
+        close(&rows[4].1, &[0.5, 0.5, 1.0, 1.0, 1.0, -8.0]);
+    }
+}
+
 #[test]
 fn a_sensor_with_messages_at_its_own_rate_is_read_by_them() {
     let mut all = open(&fixture(), None, Some(1)).unwrap();

@@ -234,6 +234,7 @@ fn correction(
             rotation,
             offset,
             scale,
+            in_vehicle: false,
         },
         name,
     ))
