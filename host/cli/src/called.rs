@@ -39,7 +39,7 @@ impl From<Error> for Refusal {
 /// # Errors
 /// See [`Refusal`].
 pub fn import(arguments: Vec<OsString>) -> Result<ImportSummary, Refusal> {
-    Ok(imported(parsed::<ImportArgs>("import", arguments)?)?)
+    Ok(imported(parsed::<ImportArgs>("import", arguments)?)?.0)
 }
 
 /// Result of `mimu design` with these arguments, and the plan as TOML; a comparison has no plan.

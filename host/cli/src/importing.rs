@@ -333,7 +333,7 @@ pub(crate) fn imported_log(
     file: &Path,
     out: &Path,
     options: Vec<OsString>,
-) -> Result<ImportSummary> {
+) -> Result<(ImportSummary, ImportOptions)> {
     #[derive(clap::Parser)]
     struct Alone {
         #[command(flatten)]
@@ -386,8 +386,8 @@ fn low_rate(summary: &ImportSummary) -> Option<String> {
     })
 }
 
-/// Makes the recording, and prints nothing.
-pub(crate) fn imported(mut args: ImportArgs) -> Result<ImportSummary> {
+/// Makes the recording, and prints nothing. Returns the options that say everything as well.
+pub(crate) fn imported(mut args: ImportArgs) -> Result<(ImportSummary, ImportOptions)> {
     let (files, faces) = faces(&args)?;
     let chosen = match (&args.preset, args.columns.is_empty()) {
         (None, false) => None,
@@ -482,5 +482,5 @@ pub(crate) fn imported(mut args: ImportArgs) -> Result<ImportSummary> {
     summary.arguments = arguments;
     summary.warnings.extend(assumed);
     summary.warnings.extend(low_rate(&summary));
-    Ok(summary)
+    Ok((summary, options))
 }

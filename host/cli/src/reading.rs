@@ -8,7 +8,7 @@ use clap::Args;
 use mimu::prepared::Prepared;
 use mimu::signal::stillness::DwellSearch;
 use mimu_recording::error::{Error, Result};
-use mimu_recording::{MANIFEST_FILE, PoseMeans, Recording};
+use mimu_recording::{ImportOptions, MANIFEST_FILE, PoseMeans, Recording};
 use tempfile::TempDir;
 
 use crate::importing::imported_log;
@@ -84,17 +84,39 @@ pub(crate) fn folder(path: &Path, log: &LogArgs) -> Result<PathBuf> {
     if !path.is_file() {
         return Ok(path.to_owned());
     }
+    Ok(imported_to(path, log)?.0)
+}
+
+/// The folder to which the log at `path` is imported, and the options of its import.
+pub(crate) fn imported_to(path: &Path, log: &LogArgs) -> Result<(PathBuf, ImportOptions)> {
     let out = match &log.folder {
         Some(folder) => folder.clone(),
         None => scratch()?.join(path.file_name().unwrap_or_default()),
     };
-    let mut summary = imported_log(path, &out, log.options())?;
+    let (mut summary, options) = imported_log(path, &out, log.options())?;
     // Its folder is of no interest.
     if log.folder.is_none() {
         summary.recording = path.display().to_string();
     }
     eprint!("{}", report::import_text(&summary));
-    Ok(out)
+    Ok((out, options))
+}
+
+/// Opens the recording at `path`, or that of the log at `path`, which messages then name.
+pub(crate) fn open(path: &Path, log: &LogArgs) -> Result<Recording> {
+    Ok(named(Recording::open(&folder(path, log)?)?, path))
+}
+
+/// `recording`, called by the log at `given` if it is in a folder that nobody sees.
+pub(crate) fn named(mut recording: Recording, given: &Path) -> Recording {
+    let logs = LOGS.lock().unwrap_or_else(PoisonError::into_inner);
+    if logs
+        .iter()
+        .any(|log| recording.directory.starts_with(log.path()))
+    {
+        recording.place = given.display().to_string();
+    }
+    recording
 }
 
 /// A folder that [`remove_logs`] removes.
@@ -120,11 +142,8 @@ pub(crate) fn read_samples_or_means(
     outputs: &[Option<&Path>],
     others: &[Option<&Path>],
 ) -> Result<Prepared> {
-    let given = directory;
-    let directory = &folder(given, log)?;
     let Some(means) = PoseMeans::file(directory) else {
-        let others: Vec<Option<&Path>> = others.iter().copied().chain([Some(given)]).collect();
-        return read(directory, log, search, outputs, &others);
+        return read(directory, log, search, outputs, others);
     };
     let manifest = directory.join(MANIFEST_FILE);
     let mut inputs: Vec<&Path> = vec![&manifest, &means];
@@ -141,11 +160,9 @@ pub(crate) fn read(
     outputs: &[Option<&Path>],
     others: &[Option<&Path>],
 ) -> Result<Prepared> {
-    let given = directory;
-    let directory = &folder(given, log)?;
-    let recording = Recording::open(directory)?;
-    let manifest = directory.join(MANIFEST_FILE);
-    let mut inputs: Vec<&Path> = vec![&manifest, &recording.samples, given];
+    let recording = open(directory, log)?;
+    let manifest = recording.directory.join(MANIFEST_FILE);
+    let mut inputs: Vec<&Path> = vec![&manifest, &recording.samples, directory];
     inputs.extend(others.iter().flatten());
     check_outputs(outputs, &inputs)?;
     let bar = progress("reading");

@@ -64,7 +64,7 @@ impl Prepared {
         let manifest = recording.manifest.clone();
         let integrate = manifest.reference == Reference::Gravity;
         let condensed = Condensed::read(recording, integrate, progress)?;
-        let place = recording.samples.display().to_string();
+        let place = recording.place.clone();
         Self::of_condensed(manifest, condensed, search.into(), place)
     }
 

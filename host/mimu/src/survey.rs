@@ -138,7 +138,7 @@ pub fn survey(
     options: Options,
     progress: impl Fn(f64),
 ) -> Result<Survey> {
-    let place = recording.samples.display().to_string();
+    let place = recording.place.clone();
     let indices: Vec<usize> = (0..6)
         .filter(|i| recording.columns.has(Column::Raw(*i)))
         .collect();

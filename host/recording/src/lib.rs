@@ -59,10 +59,10 @@ pub use clock::{ClockRate, REFUSED_SHARE, REPORTED_SHARE, Times};
 pub use columns::{Column, Columns, RAW_COLUMNS, REFERENCE_COLUMNS};
 pub use growing::Growing;
 pub use import::{
-    BrokenKind, BrokenLimit, BrokenRows, Chosen, ColumnList, CommentSigns, Decimal, Face,
-    ImportOptions, ImportSummary, Inputs, Jitter, Offset, PoseMean, PoseMeans, Preset, PresetUse,
-    Preview, Role, Rounds, RowFilter, RowRange, Scale, SkippedLines, TimeSummary, TwosComplement,
-    Zero, import, is_log, look, preview,
+    BrokenKind, BrokenLimit, BrokenRows, Chosen, ColumnList, CommentSigns, CopiedTable, Decimal,
+    Face, ImportOptions, ImportSummary, Inputs, Jitter, Offset, PoseMean, PoseMeans, Preset,
+    PresetUse, Preview, Role, Rounds, RowFilter, RowRange, Scale, SkippedLines, TimeSummary,
+    TwosComplement, Zero, import, is_log, look, preview,
 };
 pub use in_memory::{InMemory, usual_rate_hz};
 pub use manifest::{

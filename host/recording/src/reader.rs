@@ -23,6 +23,8 @@ pub struct Recording {
     pub directory: PathBuf,
     /// `samples.csv` or `samples.parquet` in that directory. For samples in memory, this and `directory` are the name of the device.
     pub samples: PathBuf,
+    /// What messages call it: its samples, or the log that they were imported from.
+    pub place: String,
     /// Which of the optional columns there are.
     pub columns: Columns,
     /// One sentence for each thing that was ignored.
@@ -128,6 +130,7 @@ impl Recording {
             clock_factor,
             manifest,
             directory: directory.to_owned(),
+            place: samples.display().to_string(),
             samples,
             columns: layout.columns,
             warnings: [warnings, layout.warnings].concat(),
@@ -156,6 +159,7 @@ impl Recording {
             clock_factor: manifest.by_computer(),
             manifest,
             directory: place.clone(),
+            place: place.display().to_string(),
             samples: place,
             columns,
             warnings: Vec::new(),

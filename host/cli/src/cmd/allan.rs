@@ -15,7 +15,7 @@ use mimu_recording::{MANIFEST_FILE, Recording};
 
 use crate::arguments::{JsonArgs, StrictArgs, VerboseArgs};
 use crate::output::{check_outputs, now, print, progress};
-use crate::reading::{LogArgs, folder};
+use crate::reading::{LogArgs, open};
 use crate::status::Status;
 
 #[derive(Args)]
@@ -124,7 +124,7 @@ pub fn run(args: &AllanArgs) -> Result<Status> {
     let recordings: Vec<Recording> = args
         .recordings
         .iter()
-        .map(|r| Recording::open(&folder(r, &args.log)?))
+        .map(|r| open(r, &args.log))
         .collect::<Result<_>>()?;
     let manifests: Vec<PathBuf> = args
         .recordings

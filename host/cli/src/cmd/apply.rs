@@ -4,13 +4,13 @@ use std::path::PathBuf;
 
 use clap::Args;
 use mimu::calibration::Calibration;
-use mimu::calibration::apply::apply;
-use mimu_recording::error::Result;
-use mimu_recording::{MANIFEST_FILE, Recording, SampleFormat};
+use mimu::calibration::apply::{Applied, Compensated, apply};
+use mimu_recording::error::{Argument, Error, Result};
+use mimu_recording::{CopiedTable, MANIFEST_FILE, Recording, SampleFormat};
 
 use crate::arguments::JsonArgs;
 use crate::output::{check_outputs, print, progress};
-use crate::reading::{LogArgs, folder};
+use crate::reading::{LogArgs, imported_to, named, open};
 use crate::report;
 
 #[derive(Args)]
@@ -26,8 +26,8 @@ pub(crate) struct ApplyArgs {
     /// Replace an existing recording
     #[arg(long)]
     replace: bool,
-    /// Directory of the compensated recording
-    #[arg(short, value_name = "DIR")]
+    /// Directory of the compensated recording; for a log of text also a CSV file: a copy of its rows with compensated readings
+    #[arg(short, value_name = "DIR|FILE.csv")]
     output: PathBuf,
     #[command(flatten)]
     log: LogArgs,
@@ -37,7 +37,20 @@ pub(crate) struct ApplyArgs {
 
 pub(crate) fn run(args: &ApplyArgs) -> Result<()> {
     let calibration = Calibration::read(&args.calibration)?;
-    let recording = Recording::open(&folder(&args.recording, &args.log)?)?;
+    let is_table = args
+        .output
+        .extension()
+        .is_some_and(|ending| ending.eq_ignore_ascii_case("csv"));
+    let applied = match args.recording.is_file() && is_table {
+        true => copied(args, &calibration)?,
+        false => written(args, &calibration)?,
+    };
+    print(&args.json, &report::apply_text(&applied), &applied, None)
+}
+
+/// Writes a recording.
+fn written(args: &ApplyArgs, calibration: &Calibration) -> Result<Applied> {
+    let recording = open(&args.recording, &args.log)?;
     let manifest = args.recording.join(MANIFEST_FILE);
     let inputs = [
         manifest.as_path(),
@@ -49,13 +62,48 @@ pub(crate) fn run(args: &ApplyArgs) -> Result<()> {
     let bar = progress("compensating");
     let done = apply(
         &recording,
-        &calibration,
+        calibration,
         &args.output,
         args.format,
         args.replace,
         |share| bar.reach(share),
     );
     bar.finish();
-    let applied = done?;
-    print(&args.json, &report::apply_text(&applied), &applied, None)
+    done
+}
+
+/// Writes a copy of a text file, with its readings compensated: stamps and all other columns stay as they are.
+fn copied(args: &ApplyArgs, calibration: &Calibration) -> Result<Applied> {
+    if args.output.exists() && !args.replace {
+        let error = Error::new(
+            args.output.display(),
+            "it exists already",
+            "choose another name, or replace it",
+        );
+        return Err(error.about(Argument::Replace));
+    }
+    let outputs = [Some(args.output.as_path()), args.json.file()];
+    check_outputs(&outputs, &[&args.calibration, &args.recording])?;
+    let (folder, options) = imported_to(&args.recording, &args.log)?;
+    let recording = named(Recording::open(&folder)?, &args.recording);
+    let bar = progress("compensating");
+    let mut compensated =
+        Compensated::new(&recording, calibration, |share| bar.reach(0.5 * share))?;
+    let sensors = compensated.sensors();
+    let mut copy = CopiedTable::open(&options, [sensors.gyro, sensors.accel])?;
+    let mut rows = 0;
+    compensated.for_each(
+        |share| bar.reach(0.5 + 0.5 * share),
+        |_, clean| {
+            rows += clean.len() as u64;
+            (0..clean.len()).try_for_each(|k| {
+                copy.row(std::array::from_fn(|c| {
+                    clean.raw[c].get(k).copied().unwrap_or(f64::NAN)
+                }))
+            })
+        },
+    )?;
+    bar.finish();
+    copy.write(&args.output)?;
+    Ok(compensated.into_applied(&args.output, rows))
 }

@@ -12,7 +12,7 @@ pub(crate) fn run(args: ImportArgs) -> Result<()> {
     let json = JsonArgs {
         path: args.json.path.clone(),
     };
-    let summary = imported(args)?;
+    let (summary, _) = imported(args)?;
     let mut text = report::import_text(&summary);
     text += &format!(
         "next: mimu fit {0} -o cal.toml; if the unit lay still: mimu allan {0} -o noise.toml\n",

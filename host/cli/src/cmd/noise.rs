@@ -9,13 +9,13 @@ use mimu::noise::noise_file::NoiseFile;
 use mimu::prepared::Prepared;
 use mimu_export::worst_axis::{NoiseOptions, WalkOptions};
 use mimu_export::{Format, Sources, driver, kalibr};
+use mimu_recording::MANIFEST_FILE;
 use mimu_recording::error::Result;
 use mimu_recording::result_file::stage;
-use mimu_recording::{MANIFEST_FILE, Recording};
 
 use crate::arguments::{JsonArgs, StillArgs, StrictArgs};
 use crate::output::{check_outputs, print, progress};
-use crate::reading::{LogArgs, folder};
+use crate::reading::{LogArgs, open};
 use crate::report;
 use crate::status::Status;
 
@@ -61,9 +61,8 @@ pub(crate) fn run(args: &NoiseInUseArgs) -> Result<Status> {
     let calibration = Calibration::read(&args.calibration)?;
     let noise = NoiseFile::read(&args.noise)?;
     let log = args.log.or_gravity(calibration.recording.gravity_mps2);
-    let directory = folder(&args.recording, &log)?;
-    let recording = Recording::open(&directory)?;
-    let manifest = directory.join(MANIFEST_FILE);
+    let recording = open(&args.recording, &log)?;
+    let manifest = recording.directory.join(MANIFEST_FILE);
     let mut inputs: Vec<&Path> = vec![
         &manifest,
         &recording.samples,

@@ -227,3 +227,98 @@ fn poses_for_hands_are_in_words_and_say_whose_noise_is_assumed() {
         );
     }
 }
+
+#[test]
+fn a_table_is_compensated_into_a_table_with_its_stamps_and_its_other_columns() {
+    let folder = log();
+    let at = folder.path();
+    right(at, "fit log.csv -o cal.toml");
+    let text = std::fs::read_to_string(at.join("log.csv")).unwrap();
+    let row = |(k, line): (usize, &str)| match k {
+        0 => format!("{line},mode (a)\n"),
+        300 => format!("ready\n{line},\"turn, {k}\"\n"),
+        _ => format!("{line},rest {k}\n"),
+    };
+    let more: String = text.lines().enumerate().map(row).collect();
+    std::fs::write(at.join("more.csv"), more).unwrap();
+    let said = right(at, "apply more.csv --calibration cal.toml -o made/out.csv");
+    assert!(said.starts_with("made/out.csv: "), "{said}");
+    right(
+        at,
+        "apply more.csv --calibration cal.toml --format csv -o clean2",
+    );
+    let [copy, clean, log] = ["made/out.csv", "clean2/samples.csv", "log.csv"].map(|name| {
+        let mut rows = csv::Reader::from_path(at.join(name)).unwrap();
+        let names = rows.headers().unwrap().clone();
+        (
+            names,
+            rows.records().map(|row| row.unwrap()).collect::<Vec<_>>(),
+        )
+    });
+    let column = |table: &(csv::StringRecord, Vec<csv::StringRecord>), name: &str| -> Vec<String> {
+        let at = table
+            .0
+            .iter()
+            .position(|n| n == name)
+            .unwrap_or_else(|| panic!("{name}: {:?}", table.0));
+        table.1.iter().map(|row| row[at].to_owned()).collect()
+    };
+    assert_eq!(column(&copy, "t_s"), column(&log, "t_s"));
+    for axis in ["x", "y", "z"] {
+        assert_eq!(
+            column(&copy, &format!("gyro_{axis}_rad_s")),
+            column(&clean, &format!("gyro_{axis}"))
+        );
+        assert_eq!(
+            column(&copy, &format!("accel_{axis}_m_s2")),
+            column(&clean, &format!("accel_{axis}"))
+        );
+    }
+    let modes = column(&copy, "mode (a)");
+    assert_eq!(
+        (modes[0].as_str(), modes[299].as_str()),
+        ("rest 1", "turn, 300")
+    );
+    let error = refused(at, "apply more.csv --calibration cal.toml -o made/out.csv");
+    assert!(error.ends_with("replace it (--replace)"), "{error}");
+    // What is imported in full again is a recording in SI.
+    right(at, "import made/out.csv -o again");
+}
+
+#[test]
+fn messages_about_a_log_name_the_log() {
+    let folder = log();
+    let at = folder.path();
+    let text = std::fs::read_to_string(at.join("log.csv")).unwrap();
+    let still: Vec<&str> = text.lines().take(100).collect();
+    std::fs::write(at.join("still.csv"), still.join("\n")).unwrap();
+    let error = refused(at, "fit still.csv --units m/s2,rad/s");
+    assert!(error.starts_with("mimu: still.csv, "), "{error}");
+    let found = json(&right(at, "fit log.csv --json -"));
+    assert!(!found.to_string().contains("samples.parquet"), "{found}");
+}
+
+#[test]
+fn a_suspicion_about_readings_names_the_option_that_trusts_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let row = |k: usize| {
+        let far = if k.is_multiple_of(2) { 50.0 } else { 0.0 };
+        let noise = |c: usize| 0.01 * ((k * (c + 3) + k / 7) % 5) as f64;
+        let cells: Vec<String> = (0..6).map(|c| format!("{:.3}", far + noise(c))).collect();
+        format!("{},{}\n", 10 * k, cells.join(","))
+    };
+    let rows: String = (0..400).map(row).collect();
+    std::fs::write(at.join("two.csv"), format!("ms,gx,gy,gz,ax,ay,az\n{rows}")).unwrap();
+    let import = "import two.csv --raw-unit count -o two";
+    let error = refused(at, import);
+    assert!(
+        error.contains("if the readings are right, say so") && error.contains("--trust-readings"),
+        "{error}"
+    );
+    let said = right(at, &format!("{import} --trust-readings"));
+    assert!(
+        said.contains("alternate") && said.contains("--trust-readings"),
+        "{said}"
+    );
+}

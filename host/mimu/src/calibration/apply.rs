@@ -94,32 +94,17 @@ pub fn apply(
         |share| progress(0.5 + 0.5 * share),
         |_, clean| writer.write(clean),
     )?;
-    let Compensated {
-        condensed,
-        batches,
-        warnings,
-        ..
-    } = compensated;
     let rows = writer.rows();
-    let written = writer.finish(&compensated_manifest(recording, &condensed.sha256))?;
-    let (counts, has) = (batches.counts, batches.has);
-    Ok(Applied {
-        format: "mimu-apply/1",
-        recording: written.display().to_string(),
-        judgement: calibration.judgement.clone(),
-        rows,
-        sensors: PerSensor::from_fn(|sensor| has[sensor].then_some(counts[sensor])),
-        gaps: condensed.gaps.0,
-        missing_s: condensed.gaps.1,
-        effects: batches.ids,
-        warnings,
-    })
+    let manifest = compensated_manifest(recording, &compensated.condensed.sha256);
+    let written = writer.finish(&manifest)?;
+    Ok(compensated.into_applied(&written, rows))
 }
 
 /// A recording with its compensation, to be run through once.
 pub struct Compensated<'a> {
     recording: &'a Recording,
     columns: Columns,
+    judgement: Option<Judgement>,
     condensed: Condensed,
     batches: Batches,
     warnings: Vec<Warning>,
@@ -135,7 +120,7 @@ impl<'a> Compensated<'a> {
         calibration: &Calibration,
         progress: impl Fn(f64),
     ) -> Result<Self> {
-        let place = recording.samples.display().to_string();
+        let place = recording.place.clone();
         let manifest = &recording.manifest;
         let mut warnings: Vec<Warning> = check_unit(calibration, manifest, &place)?
             .into_iter()
@@ -181,10 +166,32 @@ impl<'a> Compensated<'a> {
         Ok(Self {
             recording,
             columns,
+            judgement: calibration.judgement.clone(),
             condensed,
             batches,
             warnings,
         })
+    }
+
+    /// The result, after `rows` were written to `out`.
+    pub fn into_applied(self, out: &Path, rows: u64) -> Applied {
+        let (counts, has) = (self.batches.counts, self.batches.has);
+        Applied {
+            format: "mimu-apply/1",
+            recording: out.display().to_string(),
+            judgement: self.judgement,
+            rows,
+            sensors: PerSensor::from_fn(|sensor| has[sensor].then_some(counts[sensor])),
+            gaps: self.condensed.gaps.0,
+            missing_s: self.condensed.gaps.1,
+            effects: self.batches.ids,
+            warnings: self.warnings,
+        }
+    }
+
+    /// Which sensors it compensates.
+    pub fn sensors(&self) -> PerSensor<bool> {
+        self.batches.has
     }
 
     /// What a person should know.

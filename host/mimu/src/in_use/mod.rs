@@ -169,7 +169,7 @@ pub fn noise_in_use(
     against: Against,
     progress: impl Fn(f64),
 ) -> Result<NoiseInUse> {
-    let place = recording.samples.display().to_string();
+    let place = recording.place.clone();
     for sensor in Sensor::BOTH {
         if calibration.inverse(sensor).is_none() {
             let problem = format!("the calibration has no {sensor}");

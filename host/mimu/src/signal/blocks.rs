@@ -135,7 +135,7 @@ pub struct Condensed {
 impl Condensed {
     /// Reads `recording` once. `integrate`: also integrate the gyro, as rotations need it. `progress` receives the share that is done.
     pub fn read(recording: &Recording, integrate: bool, progress: impl Fn(f64)) -> Result<Self> {
-        let place = recording.samples.display().to_string();
+        let place = recording.place.clone();
         let rate = recording.manifest.sample_rate_hz;
         let mut condenser = Condenser::new(rate, integrate, place);
         let summary = recording.for_each_batch(progress, |batch| condenser.push(batch))?;

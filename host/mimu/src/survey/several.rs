@@ -45,7 +45,7 @@ pub fn survey_all(
 /// Refuses a recording whose channels cannot be in one file with those of the first.
 fn refuse_another_unit(first: &Recording, other: &Recording) -> Result<()> {
     let (one, two) = (&first.manifest, &other.manifest);
-    let place = |recording: &Recording| recording.samples.display().to_string();
+    let place = |recording: &Recording| recording.place.clone();
     let (what, here, there) = if are_two_units(&one.device, &two.device) {
         (
             "device",

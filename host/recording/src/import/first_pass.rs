@@ -8,7 +8,17 @@ use super::log::{self, is_log};
 use super::row::Row;
 use super::time::{Known, Stamps, Times};
 use crate::columns::Column;
-use crate::error::Result;
+use crate::error::{Error, Result};
+
+/// Most rows of a file, whose times take 1.2 GB of memory: 28 h at 1 kHz. Compressed files of a few MB may hold many more.
+pub(super) const MOST_ROWS: u64 = 100_000_000;
+
+/// The refusal of a file with `count` rows.
+pub(super) fn too_many_rows(path: &Path, count: &str) -> Error {
+    let problem = format!("it has {count} rows, and at most {MOST_ROWS} fit into memory");
+    let remedy = "cut it into several files, or record at a lower rate";
+    Error::new(path.display(), problem, remedy)
+}
 
 /// The times of the rows of `path`. `rate_hz` is the given rate, `joined_to` the times of the file to which this one is joined.
 ///
@@ -42,6 +52,9 @@ fn read(path: &Path, file: &mut ForeignFile) -> Result<Stamps> {
     let (mut row, mut before) = (Row::default(), Row::default());
     let mut stamps = Stamps::default();
     while file.next(&mut row)? {
+        if stamps.since_first.len() as u64 == MOST_ROWS {
+            return Err(too_many_rows(path, "more"));
+        }
         if stamps.since_first.is_empty() {
             stamps.first = row.stamp;
         } else if row.stamp == before.stamp {

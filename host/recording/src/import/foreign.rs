@@ -319,6 +319,22 @@ impl ForeignFile {
         [chosen, left_out + self.outside]
     }
 
+    /// Name and column of each cell of a row of text.
+    pub fn names(&self) -> Option<Vec<(String, Option<Column>)>> {
+        match &self.table {
+            Table::Text(table) => Some(table.all_names()),
+            Table::Parquet(_) | Table::Log(_) => None,
+        }
+    }
+
+    /// The cells of the last row of text as they are written, with their columns.
+    pub fn cells(&self) -> Option<impl Iterator<Item = (&[u8], Option<Column>)>> {
+        match &self.table {
+            Table::Text(table) => Some(table.all_cells()),
+            Table::Parquet(_) | Table::Log(_) => None,
+        }
+    }
+
     /// Lines of words among its rows so far, and the first of them.
     pub fn restarts(&self) -> Option<(u64, u64)> {
         match &self.table {

@@ -258,6 +258,11 @@ impl JoinedFiles {
         })
     }
 
+    /// Whether its rows are not those of the first file.
+    pub fn interpolates(&self) -> bool {
+        self.resampler.is_some() || !self.followers.is_empty()
+    }
+
     /// The manifest of the recording, without its sources and steps.
     pub fn manifest(&self, options: &ImportOptions) -> Manifest {
         let mut manifest = Manifest::new(

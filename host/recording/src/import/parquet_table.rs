@@ -7,6 +7,7 @@ use parquet::data_type::ByteArray;
 
 use super::assignment::{ColumnList, Role};
 use super::broken::{Fault, Unreadable};
+use super::first_pass::{MOST_ROWS, too_many_rows};
 use super::row_filter::{RowFilter, RowFilters};
 use super::text_table::Cells;
 use super::time::Stamp;
@@ -131,6 +132,9 @@ impl ParquetTable {
         filters: &[RowFilter],
     ) -> Result<ParquetTable> {
         let file = ParquetFile::open(path)?;
+        if file.rows() > MOST_ROWS {
+            return Err(too_many_rows(path, &file.rows().to_string()));
+        }
         let names = file.names();
         let mut warnings = Vec::new();
         let wanted: Vec<(Role, String)> = match list {

@@ -262,6 +262,26 @@ impl TextTable {
         name.filter(|name| !name.is_empty()).cloned()
     }
 
+    /// The column that the cell at `position` becomes, if it becomes one.
+    fn column(&self, position: usize) -> Option<Column> {
+        let own = self.wanted.iter().find(|(at, _)| *at == position);
+        own.and_then(|(_, role)| match role {
+            Role::Column(column) => Some(*column),
+            _ => None,
+        })
+    }
+
+    /// Name of each cell of a row, empty if the file has none, and its column.
+    pub fn all_names(&self) -> Vec<(String, Option<Column>)> {
+        let name = |k: usize| self.names.get(k).cloned().unwrap_or_default();
+        (0..self.width).map(|k| (name(k), self.column(k))).collect()
+    }
+
+    /// The cells of the last row, with their columns.
+    pub fn all_cells(&self) -> impl Iterator<Item = (&[u8], Option<Column>)> {
+        (0..self.width).map(|k| (&self.record[k], self.column(k)))
+    }
+
     /// Share of the file that has been read.
     pub fn progress(&self) -> f64 {
         self.bytes as f64 / self.length.max(1) as f64

@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use mimu::quantity::{normal_gravity, plural};
 use mimu_recording::error::{Error, Result};
-use mimu_recording::{Recording, UNNAMED, are_two_units};
+use mimu_recording::{UNNAMED, are_two_units};
 use mimu_station::boards::Boards;
 use mimu_station::gather::{Samples, Take};
 use mimu_wizard::device::DeviceSource;
@@ -15,7 +15,7 @@ use mimu_wizard::text_port::TextOpener;
 
 use super::{AcceptArgs, Source};
 use crate::output::progress;
-use crate::reading::folder;
+use crate::reading::open;
 
 /// Length of a measurement at a port, s.
 const LENGTH_S: f64 = 10.0;
@@ -98,7 +98,7 @@ impl AcceptArgs {
 
     fn read(&self, path: &Path) -> Result<Samples> {
         let is_log = path.is_file();
-        let recording = Recording::open(&folder(path, &self.log)?)?;
+        let recording = open(path, &self.log)?;
         let unknown = (is_log && self.gravity().is_none()).then_some(ANYWHERE);
         let seconds = self.length.map(|length| length.as_secs_f64());
         let gravity = self.gravity().or(unknown);

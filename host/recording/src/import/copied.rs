@@ -1,0 +1,110 @@
+//! A text file copied row by row, with its readings replaced.
+
+use std::path::Path;
+
+use super::joined::JoinedFiles;
+use super::left_out::LeftOut;
+use super::options::ImportOptions;
+use super::row::Row;
+use crate::columns::{Column, RAW_COLUMNS};
+use crate::csv_writer::write_number;
+use crate::error::{Error, Result};
+use crate::result_file::stage;
+
+/// Names of the replaced columns: a name that says the unit of the raw readings would now be wrong.
+const REPLACED: [&str; 6] = [
+    "gyro_x_rad_s",
+    "gyro_y_rad_s",
+    "gyro_z_rad_s",
+    "accel_x_m_s2",
+    "accel_y_m_s2",
+    "accel_z_m_s2",
+];
+
+/// The rows that an import of one text file reads, with all of their columns, to be written as CSV with other readings. Lines without a row and rows that
+/// the import leaves out are not copied.
+pub struct CopiedTable {
+    import: JoinedFiles,
+    /// Whether the readings of gyro and accelerometer are replaced.
+    replaced: [bool; 2],
+    csv: csv::Writer<Vec<u8>>,
+}
+
+impl CopiedTable {
+    /// Opens the file of `options`.
+    ///
+    /// # Errors
+    /// There are several files, it is not text, or its rows do not become samples one by one.
+    pub fn open(options: &ImportOptions, replaced: [bool; 2]) -> Result<Self> {
+        let path = options.file(0);
+        let refuse = |problem: &str| {
+            let remedy = "write a recording instead: name a folder";
+            Err(Error::new(path.display(), problem, remedy))
+        };
+        if options.sources() != 1 || options.means || options.is_sequence() {
+            return refuse("only a single file is copied");
+        }
+        let import = JoinedFiles::open(options, LeftOut::default())?;
+        if import.interpolates() {
+            return refuse("its times are irregular, so its rows are interpolated");
+        }
+        let Some(names) = import.first.names() else {
+            return refuse("only text is copied");
+        };
+        let name = |(k, (name, column)): (usize, (String, Option<Column>))| match column {
+            Some(Column::Raw(c)) if replaced[c / 3] => REPLACED[c].to_owned(),
+            Some(column) if name.is_empty() => column.name().to_owned(),
+            None if name.is_empty() => format!("column_{}", k + 1),
+            _ => name,
+        };
+        let names: Vec<String> = names.into_iter().enumerate().map(name).collect();
+        let mut csv = csv::Writer::from_writer(Vec::new());
+        csv.write_record(&names)
+            .map_err(|e| Error::new(path.display(), e, "copy it elsewhere"))?;
+        Ok(Self {
+            import,
+            replaced,
+            csv,
+        })
+    }
+
+    /// Copies the next row, with these readings by channel; a NaN becomes an empty cell.
+    ///
+    /// # Errors
+    /// The file has no further row: it has changed since it was imported.
+    pub fn row(&mut self, readings: [f64; RAW_COLUMNS.len()]) -> Result<()> {
+        let file = &mut self.import.first;
+        let mut row = Row::default();
+        let ended = || {
+            Error::new(
+                "copy",
+                "the file has changed while it was read",
+                "run it again",
+            )
+        };
+        if !file.next(&mut row)? {
+            return Err(ended());
+        }
+        let cells = file.cells().ok_or_else(ended)?;
+        let replaced = cells.map(|(cell, column)| match column {
+            Some(Column::Raw(c)) if self.replaced[c / 3] => {
+                let mut text = Vec::new();
+                write_number(readings[c], &mut text);
+                text
+            }
+            _ => cell.to_vec(),
+        });
+        self.csv
+            .write_record(replaced)
+            .map_err(|e| Error::new("copy", e, "run it again"))
+    }
+
+    /// Writes the copy to `out`.
+    pub fn write(self, out: &Path) -> Result<()> {
+        let bytes = self
+            .csv
+            .into_inner()
+            .map_err(|e| Error::io(out, e.error()))?;
+        stage(out, bytes)?.publish()
+    }
+}
