@@ -443,11 +443,15 @@ impl Samples {
             .filter_map(|(key, _, text)| Some((at(key)?, *text)))
             .collect();
         if cells.len() < named.len() || cells.iter().all(|(at, _)| self.keys[*at] == "time") {
-            let ours = !self.begins.is_empty() && text.contains(&self.begins);
-            return if ours && text.contains(|c: char| c.is_ascii_digit()) {
-                Taken::Damaged
-            } else {
-                Taken::Words
+            let alone = |(at, found): (usize, &str)| {
+                let [before, behind] = [&text[..at], &text[at + found.len()..]];
+                !before.ends_with(char::is_alphanumeric)
+                    && !behind.starts_with(char::is_alphanumeric)
+            };
+            let ours = !self.begins.is_empty() && text.match_indices(&self.begins).any(alone);
+            return match ours && text.contains(|c: char| c.is_ascii_digit()) {
+                true => Taken::Damaged,
+                false => Taken::Words,
             };
         }
         let again = |(at, _): &(usize, &str)| {
@@ -569,7 +573,7 @@ mod tests {
     fn damaged_lines_are_distinguished_from_words() {
         let lines = [&b"ax:1,ay:2"[..]; 3];
         let mut samples = Samples::find(&lines).unwrap();
-        assert_eq!(samples.take(1, b"MPU6050 ready"), Taken::Words);
+        assert_eq!(samples.take(1, b"MPU6050 relaxed 1"), Taken::Words);
         assert_eq!(samples.take(1, b"ax:1,ay:"), Taken::Damaged);
         assert_eq!(samples.take(1, b"ax:1,ay:2"), Taken::Part(None));
         assert_eq!(

@@ -19,6 +19,9 @@ use crate::separator::Separator;
 /// Bytes that are read at the start for each row: a longer row is rare.
 const ROW: u64 = 512;
 
+/// Rows by which cells with a label and a number are found.
+const JUDGED: usize = 100;
+
 /// The beginning of a foreign file.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Preview {
@@ -94,7 +97,7 @@ fn table_or_labelled(
             // Without names, labels are as good as words in cells of their own, but not with a number in the same cell.
             let glued =
                 |cell: &String| Line::parse(cell).is_some_and(|line| !line.labels().is_empty());
-            let table = table.filter(|table| !table.rows.iter().flatten().any(glued));
+            let table = table.filter(|table| !table.rows.iter().take(JUDGED).flatten().any(glued));
             let found = labelled(lines, most);
             let named = found.as_ref().is_some_and(|found| !found.names.is_empty());
             if named { found } else { table.or(found) }
