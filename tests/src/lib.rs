@@ -14,7 +14,7 @@
 //! | [`earth`]              | the Earth's rate in the biases of gyros on a table                |
 //! | [`recordings`]         | recordings by other people                                        |
 //! | [`planted`]            | effects of the bench, planted in them                             |
-//! | [`noise_in_use`]       | noise in motion of units that are wrong in a known way             |
+//! | [`noise_in_use`], [`flight`] | noise in motion of units that are wrong in a known way, by rests and by a trajectory |
 //! | [`niu`]                | niu's tables                                                      |
 //! | [`page`]               | tables in documents, between markers                              |
 //! | [`text_board`], [`stored_calibration`] | a board that writes text, in hands; its calibration file against its truth |
@@ -31,6 +31,7 @@ pub mod by_hand;
 pub mod coverage;
 pub mod earth;
 pub mod fleet;
+pub mod flight;
 pub mod joint;
 pub mod judged;
 pub mod niu;

@@ -23,16 +23,16 @@ use crate::status::Status;
 pub(crate) struct NoiseInUseArgs {
     /// Recording in motion, with rests before and after each motion, or with a trajectory; or a log that `mimu import` reads
     recording: PathBuf,
-    /// Calibration of the unit, not made from this recording
+    /// Calibration of the unit, not made from this recording; readings in rad/s and m/s² need none
     #[arg(long, value_name = "FILE")]
-    calibration: PathBuf,
+    calibration: Option<PathBuf>,
     /// Noise file of the unit at rest (`mimu allan -o`)
     #[arg(long, value_name = "FILE")]
     noise: PathBuf,
     /// Poses of the unit by another instrument: ground truth of EuRoC, or of TUM's benchmarks (time, position, quaternion x y z w)
     ///
     /// The times are of the same clock as those of the recording. The quaternion rotates from the unit to a frame whose z points up. Where the instrument sees
-    /// the unit, how it is mounted, and up to some 20 ms between the clocks are estimated.
+    /// the unit, how it is mounted (to some 10 degrees), and up to some 0.1 s between the clocks are estimated.
     #[arg(long, value_name = "FILE.csv")]
     trajectory: Option<PathBuf>,
     /// Time of the trajectory at which the recording's t_s is 0, s: `mimu import` prints what stamps are counted from
@@ -58,18 +58,18 @@ pub(crate) struct NoiseInUseArgs {
 }
 
 pub(crate) fn run(args: &NoiseInUseArgs) -> Result<Status> {
-    let calibration = Calibration::read(&args.calibration)?;
+    let calibration = args.calibration.as_deref().map(Calibration::read);
+    let calibration = calibration.transpose()?;
     let noise = NoiseFile::read(&args.noise)?;
-    let log = args.log.or_gravity(calibration.recording.gravity_mps2);
-    let recording = open(&args.recording, &log)?;
+    let known = calibration.as_ref().and_then(|c| c.recording.gravity_mps2);
+    let recording = open(&args.recording, &args.log.or_gravity(known))?;
+    let calibration = match calibration {
+        Some(given) => given,
+        None => Calibration::of_si(&recording.manifest)?,
+    };
     let manifest = recording.directory.join(MANIFEST_FILE);
-    let mut inputs: Vec<&Path> = vec![
-        &manifest,
-        &recording.samples,
-        &args.recording,
-        &args.calibration,
-        &args.noise,
-    ];
+    let mut inputs: Vec<&Path> = vec![&manifest, &recording.samples, &args.recording, &args.noise];
+    inputs.extend(args.calibration.as_deref());
     inputs.extend(args.trajectory.as_deref());
     check_outputs(&[args.output.as_deref(), args.json.file()], &inputs)?;
     let bar = progress("dead reckoning");

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use mimu::in_use::{Nees, NoiseInUse};
+use mimu::in_use::{Estimate, Nees, NoiseInUse};
 use mimu::quantity::{Sensor, significant};
 
 use crate::report::table::{Cell, Table};
@@ -42,8 +42,36 @@ pub fn noise_in_use_text(result: &NoiseInUse) -> String {
 }
 
 /// What its page and its text show.
-pub(super) fn tables(result: &NoiseInUse) -> [Table; 2] {
-    [densities(result), consistency(result)]
+pub(super) fn tables(result: &NoiseInUse) -> [Table; 3] {
+    [densities(result), estimates(result), consistency(result)]
+}
+
+/// Biases, and how the trajectory is mounted and timed.
+fn estimates(result: &NoiseInUse) -> Table {
+    let mut table = Table::new(
+        "Estimated beside the noise, with halves of the 95 % intervals",
+        "beyond the calibration",
+    )
+    .numbers(["x", "y", "z"]);
+    let mut row = |name: &str, own: &[Estimate], factor: f64| {
+        let cells = (0..3).map(|k| match own.get(k) {
+            Some(own) => Cell::Interval {
+                si: own.value,
+                half: own.half(),
+                factor,
+            },
+            None => Cell::Empty,
+        });
+        table.row(std::iter::once(Cell::from(name)).chain(cells));
+    };
+    row("gyro bias, deg/s", &result.biases.gyro, 1_f64.to_degrees());
+    row("accel bias, mm/s²", &result.biases.accel, 1e3);
+    if let Some(mounted) = &result.mounted {
+        row("mounting, deg", &mounted.rotation_rad, 1_f64.to_degrees());
+        row("lever arm, mm", &mounted.lever_m, 1e3);
+        row("add to the trajectory's times, ms", &[mounted.clock_s], 1e3);
+    }
+    table
 }
 
 fn densities(result: &NoiseInUse) -> Table {

@@ -14,7 +14,7 @@ use crate::effects::fitted::FittedEffect;
 use crate::quantity::{PerSensor, Sensor};
 use crate::triad::{Angles, Triad};
 use mimu_recording::error::{Error, Result};
-use mimu_recording::{RawUnit, SensorSettings};
+use mimu_recording::{Manifest, RawUnit, SensorSettings};
 
 /// The part of a calibration that a device stores: unrounded numbers of single precision.
 #[derive(Debug, Clone)]
@@ -90,6 +90,45 @@ impl Calibration {
             effects: FittedEffect::all_of_device(&stored.effects).map_err(unknown)?,
         };
         calibration.checked(place)
+    }
+
+    /// The calibration that leaves readings in SI as they are.
+    ///
+    /// # Errors
+    /// The readings are in another unit.
+    pub fn of_si(manifest: &Manifest) -> Result<Self> {
+        let place = format!("calibration of {}", manifest.device);
+        if manifest.raw_unit != RawUnit::Si {
+            let problem = format!(
+                "none is given, and the readings are in {}",
+                manifest.raw_unit
+            );
+            let remedy = "give the unit's calibration; readings in rad/s and m/s² need none";
+            return Err(Error::new(place, problem, remedy));
+        }
+        let as_it_is = || Affine {
+            matrix: Matrix3::identity(),
+            offset: Vector3::zeros(),
+        };
+        let model = PerSensor::from_fn(|_| as_it_is());
+        let mut own = Self::of_device(
+            &DeviceCalibration {
+                device: manifest.device.clone(),
+                unit_id: manifest.unit_id().map(str::to_owned),
+                sensors: None,
+                raw_unit: RawUnit::Si,
+                created: None,
+                trimmed: None,
+                sha256: None,
+                nodes: vec![Node::constant(0.0, model)],
+                range_c: None,
+                lags_s: None,
+                effects: Vec::new(),
+            },
+            &place,
+        )?;
+        own.recording.temp_c = None;
+        Ok(own)
     }
 }
 

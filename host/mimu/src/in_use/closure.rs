@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::dead_reckoning::DeadReckoning;
+use super::linearisation::Linearisation;
 use super::state::{self, By, STATES};
 use crate::quantity::{PerSensor, Sensor};
 
@@ -42,7 +43,7 @@ pub(super) struct Closure {
     pub duration_s: f64,
     /// Whether it is a segment in motion, which is judged; a rest only shows the gyro's bias.
     pub moves: bool,
-    /// Errors: estimate minus reference.
+    /// Errors: estimate minus reference. Of those that the state of the session makes, what is linear in the whole state: see [`Self::about`].
     pub residual: DVector<f64>,
     /// Derivatives by the state of the session.
     pub by: DMatrix<f64>,
@@ -66,8 +67,6 @@ pub(super) struct Ends {
     pub by: DMatrix<f64>,
     /// Covariance at the end by the noise file.
     pub known: DMatrix<f64>,
-    /// The same by white noise of the accelerometer.
-    pub white: DMatrix<f64>,
     /// By errors of attitudes and of velocities or positions.
     pub reference: [DMatrix<f64>; 2],
 }
@@ -85,7 +84,6 @@ impl Closure {
             residual,
             by,
             known,
-            white,
             reference: [attitude, reference],
         } = ends;
         let errors_by = DMatrix::from_column_slice(12, STATES, reckoned.by.as_slice());
@@ -101,7 +99,7 @@ impl Closure {
         let [turned_gyro, turned_accel] = turned;
         let shares = vec![
             gramian(1),
-            gramian(2) + white,
+            gramian(2),
             gramian(3),
             gramian(4),
             turned_gyro,
@@ -120,6 +118,12 @@ impl Closure {
             turned: reckoned.turned,
             vibration: reckoned.vibration / reckoned.duration_s,
         }
+    }
+
+    /// The errors of the whole state, given those that remain without the `biases` and the mounting and clock of `about`.
+    pub fn about(mut self, about: &Linearisation, biases: &PerSensor<Vector3<f64>>) -> Self {
+        self.residual += &self.by * about.state(biases);
+        self
     }
 }
 

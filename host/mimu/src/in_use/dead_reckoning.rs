@@ -56,6 +56,8 @@ pub(super) struct DeadReckoning {
     pub by: ErrorsBy,
     /// Covariances of the same, by [`SOURCES`].
     pub gramians: [Errors; 5],
+    /// Biases that are taken off the readings, rad/s and m/s².
+    pub biases: PerSensor<Vector3<f64>>,
     gravity: f64,
     densities: PerSensor<Vector3<f64>>,
     open: Open,
@@ -84,8 +86,13 @@ impl Open {
 }
 
 impl DeadReckoning {
-    /// Begins at the attitude `rotation`, at rest. `densities` are the squares of N of the axes.
-    pub fn new(rotation: Matrix3<f64>, gravity: f64, densities: PerSensor<Vector3<f64>>) -> Self {
+    /// Begins at the attitude `rotation`, at rest. `densities` are the squares of N of the axes; `biases` are taken off the readings.
+    pub fn new(
+        rotation: Matrix3<f64>,
+        gravity: f64,
+        densities: PerSensor<Vector3<f64>>,
+        biases: PerSensor<Vector3<f64>>,
+    ) -> Self {
         Self {
             rotation,
             velocity: Vector3::zeros(),
@@ -98,12 +105,14 @@ impl DeadReckoning {
             gramians: [Errors::zeros(); 5],
             gravity,
             densities,
+            biases,
             open: Open::new(),
         }
     }
 
     /// Follows `readings`, the means over their time.
     pub fn follow(&mut self, readings: &Readings) {
+        let readings = readings.without(&self.biases);
         let dt = readings.duration_s;
         let half = Rotation3::from_scaled_axis(readings.rate * (0.5 * dt)).into_inner();
         let middle = self.rotation * half;
@@ -209,8 +218,8 @@ mod tests {
 
     /// Ten seconds level and at rest.
     fn at_rest() -> DeadReckoning {
-        let densities = PerSensor::both(Vector3::repeat(0.0));
-        let mut reckoned = DeadReckoning::new(Matrix3::identity(), G, densities);
+        let none = PerSensor::both(Vector3::zeros());
+        let mut reckoned = DeadReckoning::new(Matrix3::identity(), G, none, none);
         let readings = Readings {
             duration_s: 0.005,
             force: Vector3::z() * G,

@@ -27,7 +27,7 @@ pub(super) fn consistency(session: &Session) -> Consistency {
     };
     let mut sums = [(0.0, 0_usize); 3];
     for half in 0..2 {
-        let fitted = session.filter_densities(|index| half_of(index) != Some(half));
+        let fitted = session.filter_densities(None, |index| half_of(index) != Some(half));
         // The reference errs alike for all: only the unit is judged.
         let mut reference = session.known(false).values;
         reference[FILTER..OF_FILTER.end]
@@ -71,6 +71,12 @@ impl Nees {
         });
         (low..=high).contains(&self.value)
     }
+}
+
+/// The estimates did not settle: what is linear about them is not about the truth.
+pub(super) fn not_settled() -> Judgement {
+    let reason = "biases, mounting and clock do not settle: --trajectory-zero has to be right to 0.1 s, and the quaternions rotate from the unit to a frame whose z points up";
+    Judgement::new(JudgementKind::Suspect, reason)
 }
 
 /// Whether the densities may be used. `sha256`: of the samples.

@@ -13,8 +13,8 @@ use crate::quantity::{PerSensor, Sensor};
 use crate::readable::STANDARD_GRAVITY;
 
 /// Standard deviations of what a filter knows nothing of: biases (rad/s, m/s²), and how a reference is mounted (m, rad, m/s², s).
-const BIAS: [f64; 2] = [0.05, 0.5];
-const MOUNTED: [f64; 4] = [0.1, 0.03, 0.3, 0.02];
+const BIAS: [f64; 2] = [0.2, 1.0];
+const MOUNTED: [f64; 4] = [0.1, 0.1, 0.3, 0.1];
 
 /// The errors of a session, and what is known beforehand.
 pub(super) struct Session {
@@ -49,6 +49,49 @@ pub(super) struct Innovation {
     pub count: usize,
 }
 
+/// A filter's knowledge after a segment.
+struct Updated<'a> {
+    segment: usize,
+    squared: f64,
+    log_det: f64,
+    x: &'a DVector<f64>,
+    p: &'a DMatrix<f64>,
+}
+
+/// The state by all segments, at the time of each.
+#[derive(Debug, Clone)]
+pub(super) struct Smoothed {
+    /// In order of time.
+    pub each: Vec<SmoothedState>,
+}
+
+/// The state at an instant.
+#[derive(Debug, Clone)]
+pub(super) struct SmoothedState {
+    pub at_s: f64,
+    value: DVector<f64>,
+    sigma: DVector<f64>,
+}
+
+impl SmoothedState {
+    /// Element `state`; 0 if the model lacks it.
+    pub fn value(&self, state: usize) -> f64 {
+        self.value[state]
+    }
+
+    /// Its standard deviation; 0 if the model lacks it.
+    pub fn sigma(&self, state: usize) -> f64 {
+        self.sigma[state]
+    }
+}
+
+impl Smoothed {
+    /// The state in the middle of the session.
+    pub fn middle(&self) -> &SmoothedState {
+        &self.each[self.each.len() / 2]
+    }
+}
+
 /// The state that a model uses, and its covariance at the beginning.
 struct Prior {
     states: Vec<usize>,
@@ -59,8 +102,8 @@ impl Session {
     /// Log-likelihood of the segments that `counts` accepts (by index), rests included; `None` if a covariance is singular.
     pub fn log_likelihood(&self, model: &Model, counts: impl Fn(usize) -> bool) -> Option<f64> {
         let mut sum = 0.0;
-        self.filter(model, &counts, |_, squared, log_det, _| {
-            sum -= 0.5 * (squared + log_det);
+        self.filter(model, &counts, |own| {
+            sum -= 0.5 * (own.squared + own.log_det)
         })?;
         sum.is_finite().then_some(sum)
     }
@@ -68,23 +111,61 @@ impl Session {
     /// The innovations of the segments in motion, each predicted by all before it.
     pub fn innovations(&self, model: &Model) -> Option<Vec<Innovation>> {
         let mut all = Vec::new();
-        self.filter(model, &|_| true, |segment, squared, _, count| {
+        self.filter(model, &|_| true, |own| {
             all.push(Innovation {
-                segment,
-                squared,
-                count,
+                segment: own.segment,
+                squared: own.squared,
+                count: self.closures[own.segment].residual.len(),
             });
         })?;
         all.retain(|own| self.closures[own.segment].moves);
         Some(all)
     }
 
-    /// Runs the filter; `each` receives index, squared innovation, logarithm of the determinant, and number of errors.
+    /// The state by all segments, those before and after each (Rauch, Tung and Striebel 1965); `None` if a covariance is singular.
+    pub fn smoothed(&self, model: &Model) -> Option<Smoothed> {
+        let mut updated = Vec::new();
+        self.filter(model, &|_| true, |own| {
+            updated.push((own.segment, own.x.clone(), own.p.clone()));
+        })?;
+        let Prior { states, .. } = self.prior(model);
+        let walks = self.walks_of(model, &states);
+        let (last, mut x, mut p) = updated.pop()?;
+        let smoothed = |segment: usize, x: &DVector<f64>, p: &DMatrix<f64>| {
+            let mut own = SmoothedState {
+                at_s: self.closures[segment].at_s,
+                value: DVector::zeros(STATES),
+                sigma: DVector::zeros(STATES),
+            };
+            for (k, state) in states.iter().enumerate() {
+                own.value[*state] = x[k];
+                own.sigma[*state] = p[(k, k)].max(0.0).sqrt();
+            }
+            own
+        };
+        let mut each = vec![smoothed(last, &x, &p)];
+        let mut after_s = self.closures[last].at_s;
+        for (segment, own, of_own) in updated.into_iter().rev() {
+            let before_s = std::mem::replace(&mut after_s, self.closures[segment].at_s);
+            let mut predicted = of_own.clone();
+            for (k, walk) in walks.iter().enumerate() {
+                predicted[(k, k)] += walk * (before_s - after_s);
+            }
+            let back = Cholesky::new(predicted.clone())?.solve(&of_own);
+            x = &own + back.transpose() * (x - &own);
+            p = &of_own + back.transpose() * (p - predicted) * back;
+            each.push(smoothed(segment, &x, &p));
+        }
+        each.reverse();
+        Some(Smoothed { each })
+    }
+
+    /// Runs the filter; `each` receives what it knows after each segment.
     fn filter(
         &self,
         model: &Model,
         counts: &impl Fn(usize) -> bool,
-        mut each: impl FnMut(usize, f64, f64, usize),
+        mut each: impl FnMut(Updated),
     ) -> Option<()> {
         let Prior {
             states,
@@ -114,11 +195,18 @@ impl Session {
                     .iter()
                     .map(|d| d.ln())
                     .sum::<f64>();
-            each(index, innovation.dot(&white), log_det, innovation.len());
+            let squared = innovation.dot(&white);
             let gain = root.solve(&(&by * &p));
             x += gain.transpose() * &innovation;
             p -= (&by * &p).transpose() * gain;
             p = (&p + p.transpose()) * 0.5;
+            each(Updated {
+                segment: index,
+                squared,
+                log_det,
+                x: &x,
+                p: &p,
+            });
         }
         Some(())
     }

@@ -4,6 +4,7 @@
 //! |---|---|
 //! | `walk`, `dead_reckoning`, `state` | one pass over the samples: the errors of each segment, and what they depend on |
 //! | `rests`, `trajectory`, `trajectory_file`, `closure` | the errors against a reference: rests before and after, or a trajectory |
+//! | `linearisation`, `mounted` | the point about which the errors are linear, and the estimates there |
 //! | `allan_noise`, `component` | what is known of the noise, and the variances that the errors may have beyond it |
 //! | `likelihood`, `search` | a filter over the segments, and the most likely variances |
 //! | `attribution`, `judged` | causes, and the errors of segments that were held out |
@@ -15,6 +16,8 @@ mod component;
 mod dead_reckoning;
 mod judged;
 mod likelihood;
+mod linearisation;
+mod mounted;
 mod noise_file;
 mod rests;
 mod search;
@@ -40,14 +43,20 @@ use crate::warning::Warning;
 use allan_noise::AllanNoise;
 use closure::Closure;
 use component::{FILTER, REFERENCE_COUNT};
-use likelihood::{Model, Session};
+use likelihood::{Model, Session, Smoothed};
+use linearisation::Linearisation;
 use mimu_allan::model::Term;
 use mimu_recording::Recording;
 use mimu_recording::error::{Error, Result};
+pub use mounted::{Estimate, Mounted};
 use search::{Fitted, Search};
 
 /// Fewer segments show no variance.
 const FEWEST_SEGMENTS: usize = 6;
+/// The point of linearisation is that of the estimates if none is further from it than this, in its standard deviations.
+const SETTLED: f64 = 0.1;
+/// Passes over the samples. A bias of 4 deg/s takes four, a clock that is 60 ms off five.
+const MOST_PASSES: usize = 12;
 
 /// What the errors are measured against.
 #[derive(Debug, Clone, Copy)]
@@ -141,6 +150,10 @@ pub struct NoiseInUse {
     pub turn_rad: f64,
     /// Rms of the acceleration above 10 Hz, m/s²; null at less than 40 samples a second.
     pub vibration_rms_mps2: Option<f64>,
+    /// Biases beyond those of the calibration in the middle of the recording, rad/s and m/s².
+    pub biases: PerSensor<[Estimate; 3]>,
+    /// How the trajectory is mounted and timed; null by rests.
+    pub mounted: Option<Mounted>,
     /// The four numbers that a filter wants.
     pub densities: Vec<Density>,
     /// Errors over what a filter believes.
@@ -182,42 +195,111 @@ pub fn noise_in_use(
         Against::Rests(prepared) => prepared.condensed.sha256.clone(),
         Against::Trajectory(_) => recording.for_each_batch(|_| (), |_| Ok(()))?.sha256,
     };
-    let (reference, (closures, refused), has_positions) = match against {
-        Against::Rests(prepared) => {
-            let all = rests::closures(recording, prepared, calibration, &allan, progress)?;
-            ("rests", all, false)
-        }
-        Against::Trajectory(poses) => {
-            let all = trajectory::closures(recording, poses, calibration, &allan, progress)?;
-            ("trajectory", all, poses.has_positions)
-        }
+    let reference = match against {
+        Against::Rests(_) => "rests",
+        Against::Trajectory(_) => "trajectory",
     };
-    let latitude = recording.manifest.latitude_deg;
-    let session = Session {
-        earth_is_known: latitude.is_some(),
-        ..session(closures, calibration, &allan, reference, has_positions)
-    };
-    let moving = session.moving();
-    if moving.len() < FEWEST_SEGMENTS {
-        let problem = format!(
-            "{} segments have a reference at both ends, and at least {FEWEST_SEGMENTS} are needed",
-            moving.len()
-        );
-        let remedy = match reference {
-            "rests" => "hold the unit still before and after each motion, or give a trajectory",
-            _ => {
-                "give the time of the trajectory at which the recording begins to count, --trajectory-zero: mimu import prints it"
+    let linearised = |about: &Linearisation, progress: &dyn Fn(f64)| {
+        let (closures, left_out) = match against {
+            Against::Rests(prepared) => {
+                rests::closures(recording, prepared, calibration, &allan, about, progress)?
+            }
+            Against::Trajectory(poses) => {
+                trajectory::closures(recording, poses, calibration, &allan, about, progress)?
             }
         };
-        return Err(Error::new(place, problem, remedy));
-    }
+        let has_positions = matches!(against, Against::Trajectory(poses) if poses.has_positions);
+        let session = Session {
+            earth_is_known: recording.manifest.latitude_deg.is_some(),
+            ..session(closures, calibration, &allan, reference, has_positions)
+        };
+        enough(&session, &place)?;
+        Ok((session, left_out))
+    };
+    let Linearised {
+        session,
+        left_out,
+        fitted,
+        smoothed,
+        is_settled,
+    } = linearised_where_it_settles(linearised, progress)?;
     let judged = Judged {
         recording,
         sha256,
         reference,
-        left_out: refused,
+        left_out,
+        fitted,
+        smoothed,
+        is_settled,
     };
     Ok(found(&session, calibration, noise, &allan, &judged))
+}
+
+/// Whether the segments are enough to show a variance.
+fn enough(session: &Session, place: &str) -> Result<()> {
+    let moving = session.moving().len();
+    if moving >= FEWEST_SEGMENTS {
+        return Ok(());
+    }
+    let problem = format!(
+        "{moving} segments have a reference at both ends, and at least {FEWEST_SEGMENTS} are needed"
+    );
+    let remedy = match session.mounted {
+        false => "hold the unit still before and after each motion, or give a trajectory",
+        true => {
+            "give the time of the trajectory at which the recording begins to count, --trajectory-zero: mimu import prints it"
+        }
+    };
+    Err(Error::new(place, problem, remedy))
+}
+
+/// A session whose errors are linear about its own estimates.
+struct Linearised {
+    session: Session,
+    /// Segments left out.
+    left_out: usize,
+    fitted: Fitted,
+    smoothed: Smoothed,
+    /// Whether the estimates stayed where they were.
+    is_settled: bool,
+}
+
+/// Linearises about the estimates of a smoother until they stay: Gauss-Newton, with the densities fitted anew at each step, which are its weights.
+fn linearised_where_it_settles(
+    linearised: impl Fn(&Linearisation, &dyn Fn(f64)) -> Result<(Session, usize)>,
+    progress: impl Fn(f64),
+) -> Result<Linearised> {
+    let mut about = Linearisation::default();
+    let mut before: Option<Fitted> = None;
+    let mut passes = 0;
+    loop {
+        // The last step is as likely as not the third.
+        let share = |k: usize| 1.0 - 0.5_f64.powi(k as i32);
+        let [from, to] = [passes, passes + 1].map(share);
+        let (session, left_out) = linearised(&about, &|s| progress(from + s * (to - from)))?;
+        let fitted = session.filter_densities(before, |_| true);
+        let smoothed = session.smoothed(&fitted.model).ok_or_else(|| {
+            let problem = "the errors of the segments cannot be weighed";
+            Error::new(
+                "noise in use",
+                problem,
+                "report this error: it is a mistake in the program",
+            )
+        })?;
+        let is_settled = about.distance(&smoothed) < SETTLED;
+        passes += 1;
+        if is_settled || passes == MOST_PASSES {
+            return Ok(Linearised {
+                session,
+                left_out,
+                fitted,
+                smoothed,
+                is_settled,
+            });
+        }
+        about = Linearisation::of(&smoothed);
+        before = Some(fitted);
+    }
 }
 
 fn session(
@@ -274,13 +356,18 @@ impl Session {
     }
 
     /// The most likely densities of a filter, by the segments that `counts` accepts.
-    pub(self) fn filter_densities(&self, counts: impl Fn(usize) -> bool + Sync) -> Fitted {
+    pub(self) fn filter_densities(
+        &self,
+        from: Option<Fitted>,
+        counts: impl Fn(usize) -> bool + Sync,
+    ) -> Fitted {
         let search = Search {
             session: self,
             counts,
         };
         let free: Vec<usize> = OF_FILTER.collect();
-        search.maximise(search.fitted(self.known(false)), &free)
+        let start = from.map_or_else(|| self.known(false), |own| own.model);
+        search.maximise(search.fitted(start), &free)
     }
 }
 
@@ -293,6 +380,9 @@ struct Judged<'a> {
     reference: &'static str,
     /// Segments left out.
     left_out: usize,
+    fitted: Fitted,
+    smoothed: Smoothed,
+    is_settled: bool,
 }
 
 fn found(
@@ -302,7 +392,7 @@ fn found(
     allan: &AllanNoise,
     judged: &Judged,
 ) -> NoiseInUse {
-    let fitted = session.filter_densities(|_| true);
+    let fitted = &judged.fitted;
     let search = Search {
         session,
         counts: |_| true,
@@ -310,7 +400,7 @@ fn found(
     let free: Vec<usize> = OF_FILTER.collect();
     let ranges: Vec<[f64; 2]> = (0..FILTER)
         .into_par_iter()
-        .map(|k| search.range(&fitted, k, &free))
+        .map(|k| search.range(fitted, k, &free))
         .collect();
     let attributed = attribution::of(session);
     let densities = densities(session, &fitted.model, &ranges, allan);
@@ -323,7 +413,10 @@ fn found(
     let shaken: f64 = moving.iter().map(|c| c.vibration * c.duration_s).sum();
     let manifest = &judged.recording.manifest;
     let fast = manifest.sample_rate_hz >= 4.0 * VIBRATION_HZ;
-    let judgement = judged::judgement(session, &nees, &judged.sha256, calibration);
+    let judgement = match judged.is_settled {
+        true => judged::judgement(session, &nees, &judged.sha256, calibration),
+        false => judged::not_settled(),
+    };
     let sentences = attribution::sentences(&densities, &attributed);
     let warnings = calibration.other_unit(manifest).into_iter();
     NoiseInUse {
@@ -338,6 +431,8 @@ fn found(
         segment_s: mean(&|c| c.duration_s),
         turn_rad: mean(&|c| c.turned),
         vibration_rms_mps2: fast.then(|| (shaken / total_s).sqrt()),
+        biases: mounted::biases(&judged.smoothed),
+        mounted: session.mounted.then(|| Mounted::of(&judged.smoothed)),
         densities,
         nees,
         causes: attributed.causes,

@@ -1,13 +1,11 @@
 //! The noise file of a unit in use, for the exports.
 
 use super::likelihood::{Model, Session};
+use super::mounted::SIGMAS;
 use crate::judgement::Judgement;
 use crate::noise::noise_file::{FileCoefficient, NoiseChannel, NoiseFile};
 use crate::quantity::{AXES, Sensor};
 use mimu_allan::model::Term;
-
-/// Half-width of a 95 % interval in standard deviations.
-const SIGMAS: f64 = 1.96;
 
 /// The noise at rest with what motion adds to every axis.
 pub(super) fn of(

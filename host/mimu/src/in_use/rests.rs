@@ -5,6 +5,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, UnitVector3, Vector3};
 use super::AllanNoise;
 use super::closure::{Closure, Ends, by_first_attitude, rows_of};
 use super::dead_reckoning::DeadReckoning;
+use super::linearisation::Linearisation;
 use super::state::{By, Readings, STATES};
 use super::walk::{Span, Walked, walk};
 use crate::calibration::Calibration;
@@ -26,6 +27,7 @@ pub(super) fn closures(
     prepared: &Prepared,
     calibration: &Calibration,
     noise: &AllanNoise,
+    about: &Linearisation,
     progress: impl Fn(f64),
 ) -> Result<(Vec<Closure>, usize)> {
     let dwells = prepared.dwells.list.iter().filter(|d| {
@@ -42,10 +44,11 @@ pub(super) fn closures(
             end_s: pair[1][0],
         })
         .collect();
-    let begin = |_: usize, before: &[Readings]| {
+    let begin = |k: usize, before: &[Readings]| {
         let rest = *before.last().unwrap_or(&Readings::default());
         let duration_s = rest.duration_s.max(1e-9);
-        begun(&mean_of(&rest, duration_s), gravity, noise)
+        let biases = about.biases_at(0.5 * (spans[k].start_s + spans[k].end_s));
+        begun(&mean_of(&rest, duration_s), gravity, noise, biases)
     };
     let walked = walk(recording, calibration, &rests, &spans, begin, progress)?;
     let matrices = PerSensor::from_fn(|s| {
@@ -64,7 +67,9 @@ pub(super) fn closures(
     let mut refused = 0;
     for (k, mean) in means.iter().enumerate() {
         if mean.duration_s > 0.0 {
-            closures.push(at_rest(mean, rests[k], noise, vertical));
+            let biases = about.biases_at(0.5 * (rests[k][0] + rests[k][1]));
+            let closure = at_rest(&mean.without(&biases), rests[k], noise, vertical);
+            closures.push(closure.about(about, &biases));
         }
         let Some(after) = means.get(k + 1) else { break };
         match &reckoned[k] {
@@ -73,8 +78,9 @@ pub(super) fn closures(
                     && mean.duration_s > 0.0
                     && after.duration_s > 0.0 =>
             {
-                let ends = at_end(r, mean, after, gravity, noise);
-                closures.push(Closure::of(r, ends, rests[k][1], &matrices));
+                let ends = at_end(r, &after.without(&r.biases), gravity, noise);
+                let closure = Closure::of(r, ends, rests[k][1], &matrices);
+                closures.push(closure.about(about, &r.biases));
             }
             _ => refused += 1,
         }
@@ -93,8 +99,14 @@ fn mean_of(sum: &Readings, duration_s: f64) -> Readings {
     }
 }
 
-/// Dead reckoning from a rest: the mean force points up.
-fn begun(rest: &Readings, gravity: f64, noise: &AllanNoise) -> DeadReckoning {
+/// Dead reckoning from a rest: the mean force without the `biases` points up.
+fn begun(
+    rest: &Readings,
+    gravity: f64,
+    noise: &AllanNoise,
+    biases: PerSensor<Vector3<f64>>,
+) -> DeadReckoning {
+    let rest = rest.without(&biases);
     let up = Vector3::z();
     let rotation = Rotation3::rotation_between(&rest.force, &up)
         .unwrap_or_else(|| {
@@ -104,30 +116,22 @@ fn begun(rest: &Readings, gravity: f64, noise: &AllanNoise) -> DeadReckoning {
             )
         })
         .into_inner();
-    let mut reckoned = DeadReckoning::new(rotation, gravity, noise.squared());
+    let mut reckoned = DeadReckoning::new(rotation, gravity, noise.squared(), biases);
     let tilt = -up.cross_matrix() / gravity;
     let mut force = By::zeros();
     rest.add_errors(&mut force, Sensor::Accel, &rotation, 1.0);
     let by = tilt * force;
     reckoned.by.fixed_rows_mut::<3>(0).copy_from(&by);
+    // A rest has the noise at rest; what motion adds begins with the motion.
     let density = Matrix3::from_diagonal(&noise.squared().accel);
-    let known = rotation * density * rotation.transpose();
-    for (source, of_force) in [(0, known), (2, Matrix3::identity())] {
-        let tilted = tilt * of_force * tilt.transpose() / rest.duration_s;
-        let gramian = &mut reckoned.gramians[source];
-        gramian.fixed_view_mut::<3, 3>(0, 0).copy_from(&tilted);
-    }
+    let known = rotation * density * rotation.transpose() / rest.duration_s;
+    let mut tilted = reckoned.gramians[0].fixed_view_mut::<3, 3>(0, 0);
+    tilted.copy_from(&(tilt * known * tilt.transpose()));
     reckoned
 }
 
 /// At the rest `after`: the force that was carried along points up, and the velocity is zero.
-fn at_end(
-    reckoned: &DeadReckoning,
-    before: &Readings,
-    after: &Readings,
-    gravity: f64,
-    noise: &AllanNoise,
-) -> Ends {
+fn at_end(reckoned: &DeadReckoning, after: &Readings, gravity: f64, noise: &AllanNoise) -> Ends {
     let rotation = reckoned.rotation;
     let up = (rotation * after.force).normalize();
     let residual = DVector::from_iterator(
@@ -146,24 +150,23 @@ fn at_end(
     let mut force = By::zeros();
     after.add_errors(&mut force, Sensor::Accel, &rotation, 1.0 / gravity);
     let by = rows_of(&force, &[0, 1], 0, 5);
-    let level = |of_force: Matrix3<f64>| {
-        let each = of_force / (gravity * gravity * after.duration_s);
-        DMatrix::from_fn(5, 5, |i, j| if i < 2 && j < 2 { each[(i, j)] } else { 0.0 })
-    };
     let density = Matrix3::from_diagonal(&noise.squared().accel);
+    let level = rotation * density * rotation.transpose() / (gravity * gravity * after.duration_s);
     // The tilt of both rests is that of their mean; what a hand trembles is on top, independently.
     let first = &of * by_first_attitude(reckoned, gravity, 0.0).columns(0, 2);
     let mut attitude = &first * first.transpose();
     attitude[(0, 0)] += 1.0;
     attitude[(1, 1)] += 1.0;
     let velocity = DMatrix::from_fn(5, 5, |i, j| if i == j && i >= 2 { 2.0 } else { 0.0 });
-    debug_assert!(before.duration_s > 0.0);
     Ends {
         of,
         residual,
         by,
-        known: level(rotation * density * rotation.transpose()),
-        white: level(Matrix3::identity()),
+        known: DMatrix::from_fn(
+            5,
+            5,
+            |i, j| if i < 2 && j < 2 { level[(i, j)] } else { 0.0 },
+        ),
         reference: [attitude, velocity],
     }
 }
@@ -192,7 +195,7 @@ fn at_rest(rest: &Readings, [from, to]: [f64; 2], noise: &AllanNoise, vertical: 
         by: DMatrix::from_column_slice(3, STATES, by.as_slice()),
         known,
         shares: vec![
-            &one / t,
+            none.clone(),
             none.clone(),
             &one * (rest.vibration / t),
             none.clone(),

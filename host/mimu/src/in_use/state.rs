@@ -22,7 +22,7 @@ pub(super) const LEVER: Range<usize> = 39..42;
 pub(super) const MOUNTING: Range<usize> = 42..45;
 /// Error of gravity in the frame of the reference, m/s².
 pub(super) const GRAVITY: Range<usize> = 45..48;
-/// By how much the reference's clock is ahead, s.
+/// What to add to the times of the reference, s.
 pub(super) const CLOCK: usize = 48;
 
 /// Errors of C.
@@ -62,6 +62,15 @@ pub(super) struct Readings {
 }
 
 impl Readings {
+    /// Without the biases that are known already.
+    pub fn without(&self, biases: &PerSensor<Vector3<f64>>) -> Self {
+        Self {
+            rate: self.rate - biases.gyro,
+            force: self.force - biases.accel,
+            ..*self
+        }
+    }
+
     /// Adds the errors that this causes in what `sensor` measures, rotated by `rotation` and times `weight`.
     pub fn add_errors(&self, by: &mut By, sensor: Sensor, rotation: &Matrix3<f64>, weight: f64) {
         let (c, raw) = (matrix(sensor).start, self.raw[sensor]);

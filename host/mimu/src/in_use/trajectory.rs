@@ -7,6 +7,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, UnitQuaternion, Vector3};
 use super::AllanNoise;
 use super::closure::{Closure, Ends, by_first_attitude};
 use super::dead_reckoning::DeadReckoning;
+use super::linearisation::Linearisation;
 use super::state::{CLOCK, GRAVITY, LEVER, MOUNTING, Readings, STATES};
 use super::trajectory_file::{Pose, Trajectory};
 use super::walk::{Span, walk};
@@ -26,9 +27,11 @@ pub(super) fn closures(
     trajectory: &Trajectory,
     calibration: &Calibration,
     noise: &AllanNoise,
+    about: &Linearisation,
     progress: impl Fn(f64),
 ) -> Result<(Vec<Closure>, usize)> {
     let gravity = recording.manifest.gravity_mps2;
+    let trajectory = &trajectory.of_unit(about);
     let segments = segments(&trajectory.poses);
     let spans: Vec<Span> = segments
         .iter()
@@ -39,8 +42,9 @@ pub(super) fn closures(
         })
         .collect();
     let begin = |k: usize, _: &[Readings]| {
-        let first = segments[k][0];
-        DeadReckoning::new(matrix(&first.attitude), gravity, noise.squared())
+        let [first, _, last] = segments[k];
+        let biases = about.biases_at(0.5 * (first.t_s + last.t_s));
+        DeadReckoning::new(matrix(&first.attitude), gravity, noise.squared(), biases)
     };
     let walked = walk(recording, calibration, &[], &spans, begin, progress)?;
     let matrices = PerSensor::from_fn(|s| {
@@ -55,8 +59,10 @@ pub(super) fn closures(
         let whole = own[2].t_s - own[0].t_s;
         match reckoned.clone() {
             Some(mut r) if (r.duration_s - whole).abs() < 1e-6 => {
-                let ends = at_end(&mut r, own, ends, gravity, trajectory);
-                closures.push(Closure::of(&r, ends, own[0].t_s, &matrices));
+                let ends = ends.map(|readings| readings.without(&r.biases));
+                let ends = at_end(&mut r, own, &ends, gravity, trajectory);
+                let closure = Closure::of(&r, ends, own[0].t_s, &matrices);
+                closures.push(closure.about(about, &r.biases));
             }
             _ => refused += 1,
         }
@@ -96,7 +102,8 @@ fn segments(poses: &[Pose]) -> Vec<[Pose; 3]> {
         if dense && at < middle && middle < to {
             all.push([at, middle, to].map(|k| poses[k]));
         }
-        at = to.max(at + 1);
+        // The next one shares no pose: its errors are then independent.
+        at = to.max(at) + 1;
     }
     all
 }
@@ -151,11 +158,11 @@ fn at_end(
         let error = reckoned.position - reckoned.marked * ratio - second(own.map(|p| p.position));
         residual.rows_mut(3, 3).copy_from(&error);
         let lever = rotations[2] - rotations[1] * ratio + rotations[0] * (ratio - 1.0);
-        let moved = second(own.map(|p| trajectory.velocity_at(p.t_s)));
+        let moved = second(own.map(|p| trajectory.velocity_at(&p)));
         for i in 0..3 {
             of[(3 + i, 6 + i)] = 1.0;
             of[(3 + i, 9 + i)] = -ratio;
-            reference[1][(3 + i, 3 + i)] = 6.0;
+            reference[1][(3 + i, 3 + i)] = 1.0 + ratio * ratio + (ratio - 1.0).powi(2);
             by[(3 + i, CLOCK)] -= moved[i];
             for j in 0..3 {
                 by[(3 + i, LEVER.start + j)] -= lever[(i, j)];
@@ -167,7 +174,6 @@ fn at_end(
     Ends {
         by: by + &of * errors_by,
         known: DMatrix::zeros(rows, rows),
-        white: DMatrix::zeros(rows, rows),
         of,
         residual,
         reference,

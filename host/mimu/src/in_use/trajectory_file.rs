@@ -4,6 +4,7 @@ use std::path::Path;
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
+use super::linearisation::Linearisation;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::read_text;
 
@@ -101,11 +102,24 @@ impl Trajectory {
         self
     }
 
-    /// Velocity near an instant, by the poses around it, m/s.
-    pub(super) fn velocity_at(&self, t_s: f64) -> Vector3<f64> {
-        let after = self.poses.partition_point(|p| p.t_s <= t_s);
-        let last = self.poses.len() - 1;
-        let (a, b) = (after.saturating_sub(2), (after + 1).min(last));
+    /// The same for the unit, by the clock of the recording, if the reference is mounted and timed as `about`.
+    pub(super) fn of_unit(&self, about: &Linearisation) -> Self {
+        let turned = UnitQuaternion::from_scaled_axis(-about.mounting);
+        let of = |pose: &Pose| Pose {
+            t_s: pose.t_s + about.clock_s,
+            attitude: pose.attitude * turned,
+            position: pose.position,
+        };
+        Self {
+            poses: self.poses.iter().map(of).collect(),
+            ..self.clone()
+        }
+    }
+
+    /// Velocity at a pose, by those before and after it, m/s.
+    pub(super) fn velocity_at(&self, pose: &Pose) -> Vector3<f64> {
+        let own = self.poses.partition_point(|p| p.t_s < pose.t_s);
+        let (a, b) = (own.saturating_sub(1), (own + 1).min(self.poses.len() - 1));
         let (a, b) = (&self.poses[a], &self.poses[b]);
         (b.position - a.position) / (b.t_s - a.t_s)
     }
