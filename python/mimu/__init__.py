@@ -23,15 +23,15 @@ from mimu._error import Error
 from mimu._files import Export, SensorVerification, Verification, export, load, load_noise, verify
 from mimu._fit import Dwell, Figures, Fit, Parameter, SensorFit, SessionsFit, fit, fit_sessions
 from mimu._mimu import Calibration, Noise, Recording
-from mimu._noise_in_use import Cause, Consistency, Density, Nees, NoiseInUse, noise_in_use
+from mimu._noise_in_use import Biases, Cause, Consistency, Density, Estimate, Mounted, Nees, NoiseInUse, noise_in_use
 from mimu._recording import read
 from mimu._result import Judgement, Message
 
 __version__ = _version("mimu")
 
 __all__ = [
-    "Allan", "Calibration", "Cause", "Channel", "Coefficient", "CoefficientSigma", "Consistency", "Density", "Design", "Diagnosis", "Dwell",
-    "Effect", "Error", "Export", "Figures", "Fit", "Judgement", "Leftover", "Message", "Nees", "NextExperiment", "Noise",
+    "Allan", "Biases", "Calibration", "Cause", "Channel", "Coefficient", "CoefficientSigma", "Consistency", "Density", "Design", "Diagnosis", "Dwell",
+    "Effect", "Error", "Estimate", "Export", "Figures", "Fit", "Judgement", "Leftover", "Message", "Mounted", "Nees", "NextExperiment", "Noise",
     "NoiseCoefficient", "NoiseInUse", "NotExcited", "Parameter", "ParameterSigma", "Recording", "Rejected", "SchemeComparison",
     "SensorDiagnosis", "SensorFit", "SensorVerification", "SessionsFit", "Shown", "Verification", "allan", "compare_schemes", "design", "diagnose",
     "export", "fit", "fit_sessions", "load", "load_noise", "next_experiment", "noise_in_use", "read", "thermal", "verify",

@@ -62,12 +62,43 @@ class Cause:
     share: float
 
 
+@dataclass(frozen=True)
+class Estimate:
+    """An estimate with its 95 % interval."""
+
+    value: float
+    interval: list[float]
+
+
+@dataclass(frozen=True)
+class Biases:
+    """Biases beyond those of the calibration in the middle of the recording, rad/s and m/s²."""
+
+    gyro: list[Estimate]
+    accel: list[Estimate]
+
+
+@dataclass(frozen=True)
+class Mounted:
+    """How a trajectory is mounted and timed against the unit."""
+
+    #: What to add to its times, s.
+    clock_s: Estimate
+    #: Rotation vector from the unit's axes to those of the trajectory, in axes of the unit, rad.
+    rotation_rad: list[Estimate]
+    #: Where its point lies, in axes of the unit, m.
+    lever_m: list[Estimate]
+
+
 class NoiseInUse(Result):
     """The densities that explain the errors of dead reckoning in motion."""
 
     _native: _mimu.NoiseInUse
     _questions = ("json", "text", "html", "noise")
 
+    biases: Biases
+    #: None by rests.
+    mounted: Mounted | None
     densities: list[Density]
     nees: Consistency
     causes: list[Cause]
@@ -82,6 +113,8 @@ class NoiseInUse(Result):
     def __init__(self, native: _mimu.NoiseInUse) -> None:
         super().__init__(native)
         data = self.to_dict()
+        self.biases = typed(Biases, data["biases"])
+        self.mounted = typed(Mounted, data["mounted"]) if data["mounted"] else None
         self.densities = [typed(Density, density) for density in data["densities"]]
         self.nees = typed(Consistency, data["nees"])
         self.causes = [typed(Cause, cause) for cause in data["causes"]]

@@ -138,7 +138,7 @@ impl Flight {
         let curves = Curves::new(&mut Random::new(seed, "curves"));
         let mut random = Random::new(seed, "noise");
         let count = (self.duration_s * RATE_HZ) as usize;
-        let mut walked = [Vector3::zeros(); 2];
+        let mut walked = [Vector3::<f64>::zeros(); 2];
         let mut middle = walked;
         let rows = (0..count).map(|row| {
             let inputs = curves.inputs(row as f64 / RATE_HZ);

@@ -1,10 +1,10 @@
 //! Which causes the errors beyond Allan's noise have, by likelihood, and the sentences that say so.
 
-use nalgebra::Cholesky;
+use nalgebra::{Cholesky, Matrix3};
 use rayon::prelude::*;
 
 use super::closure::Closure;
-use super::component::{Cause, Component, FILTER};
+use super::component::{Cause, Component, FILTER, Kind};
 use super::likelihood::{Model, Session};
 use super::search::{Fitted, Search};
 use super::{CauseFound, Density};
@@ -88,7 +88,10 @@ fn attributed(session: &Session, best: &Fitted, included: &[(usize, f64)]) -> At
             CauseFound {
                 sensor: component.sensor,
                 cause: component.cause,
-                size: (component.unit * best.model.values[*k]).sqrt(),
+                size: match &component.kind {
+                    Kind::Matrix(sensor) => matrix_error(session, best, *sensor),
+                    _ => (component.unit * best.model.values[*k]).sqrt(),
+                },
                 unit: unit(component, *k),
                 deviance: *deviance,
                 share: power / of_sensor(component.sensor).max(f64::MIN_POSITIVE),
@@ -107,6 +110,19 @@ fn attributed(session: &Session, best: &Fitted, included: &[(usize, f64)]) -> At
             accel: share(Sensor::Accel, accel),
         },
     }
+}
+
+/// The estimated relative error of the matrix of `sensor` on its worst axis: the norm of a row of `E`, where `E C` is the error of C.
+fn matrix_error(session: &Session, best: &Fitted, sensor: Sensor) -> f64 {
+    let estimated = session.smoothed(&best.model);
+    let inverse = session.matrices[sensor].try_inverse();
+    let (Some(estimated), Some(inverse)) = (estimated, inverse) else {
+        return f64::NAN;
+    };
+    let (own, from) = (estimated.middle(), super::state::matrix(sensor).start);
+    let error = Matrix3::from_fn(|i, j| own.value(from + 3 * i + j)) * inverse;
+    let rows = error.row_iter().map(|row| row.norm());
+    rows.fold(0.0, f64::max)
 }
 
 /// Errors that component `k` adds, as a sum of squares over those of Allan's noise.
@@ -168,7 +184,7 @@ impl CauseFound {
         let deg_per_g = || significant((size * STANDARD_GRAVITY).to_degrees());
         match self.cause {
             Cause::Scale => format!(
-                "the calibration's scale factors and angles are wrong by {} % in this session; calibrate again",
+                "the calibration's scale factors and angles are wrong by {} % on the worst axis in this session; calibrate again",
                 significant(100.0 * size)
             ),
             Cause::Motion => format!(
@@ -236,5 +252,13 @@ pub(super) fn sentences(densities: &[Density], found: &Attributed) -> Vec<String
             ),
         }
     });
-    each.collect()
+    let unseen = densities.iter().filter(|d| d.value == 0.0).map(|d| {
+        format!(
+            "{}: neither rest nor motion shows a random walk of the bias; a file has the upper end of its interval, {} {}",
+            d.sensor,
+            significant(d.interval[1]),
+            d.unit
+        )
+    });
+    each.chain(unseen).collect()
 }

@@ -117,7 +117,7 @@ pub struct CauseFound {
     pub sensor: Option<Sensor>,
     /// Cause.
     pub cause: Cause,
-    /// Standard deviation, in the unit of the cause.
+    /// Standard deviation, in the unit of the cause; of a matrix its estimated relative error on the worst axis.
     pub size: f64,
     /// Unit of [`Self::size`].
     pub unit: &'static str,

@@ -24,7 +24,12 @@ pub(super) fn of(
         };
         // In the unit of calibrated readings already, as the densities are.
         let n = channel.get(Term::N).map_or(0.0, |c| c.value.powi(2));
-        let walk = session.walks[sensor][axis];
+        // An axis whose walk the rest does not show has that of the worst axis: a filter takes one number for three axes, and its end would be the largest.
+        let own = session.walks[sensor];
+        let walk = match own[axis] > 0.0 {
+            true => own[axis],
+            false => own.into_iter().fold(0.0, f64::max),
+        };
         let with = |known: f64, k: usize| {
             let of = |value: f64| (known + value * session.components[k].unit).sqrt();
             let [lower, upper] = ranges[k].map(of);

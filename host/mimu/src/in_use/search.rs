@@ -7,8 +7,10 @@ const RANGE: [f64; 2] = [-9.0, 18.0];
 /// Coordinates are searched in turn until a round gains less than this in log-likelihood.
 const GAIN: f64 = 0.01;
 const ROUNDS: usize = 10;
-/// Half of the 95 % quantile of chi-square of one degree of freedom.
+/// Half of the 95 % quantile of chi-square of one degree of freedom; and of a variance that is 0 in truth, whose deviance is 0 in every other
+/// recording (Self and Liang 1987).
 const HALF_DEVIANCE: f64 = 1.920_729;
+const HALF_DEVIANCE_AT_0: f64 = 1.352_772;
 /// Steps of a search over the whole range, and the step of a local one.
 const COARSE: u32 = 12;
 const LOCAL: f64 = 0.5;
@@ -95,14 +97,15 @@ impl<F: Fn(usize) -> bool + Sync> Search<'_, F> {
     /// The 95 % range of component `k`: the values whose likelihood, with `free` fitted to each, is near the largest.
     pub fn range(&self, best: &Fitted, k: usize, free: &[usize]) -> [f64; 2] {
         let others: Vec<usize> = free.iter().copied().filter(|j| *j != k).collect();
-        let falls = |value: f64| {
+        let fall = |value: f64| {
             let mut model = best.model.clone();
             model.values[k] = value;
             let profile = self.maximise_near(self.fitted(model), &others);
-            best.log_likelihood - profile.log_likelihood > HALF_DEVIANCE
+            best.log_likelihood - profile.log_likelihood
         };
+        let falls = |value: f64| fall(value) > HALF_DEVIANCE;
         let middle = best.model.values[k].max(RANGE[0].exp());
-        let lower = match best.model.values[k] <= RANGE[0].exp() || !falls(0.0) {
+        let lower = match best.model.values[k] <= RANGE[0].exp() || fall(0.0) < HALF_DEVIANCE_AT_0 {
             true => 0.0,
             false => edge(RANGE[0], middle.ln(), |v| !falls(v)),
         };
