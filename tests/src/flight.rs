@@ -1,4 +1,5 @@
-//! Flights with known truth: readings and a trajectory computed from the same curves, with errors of the reference and of the biases alone.
+//! Flights with known truth: readings and a trajectory computed from the same curves, with errors of the reference and of the biases alone. With rests, the
+//! same curves are followed from one rest to the next.
 
 use std::fmt::Write as _;
 use std::ops::Range;
@@ -34,9 +35,14 @@ pub struct Flight {
     pub late_s: f64,
     /// White noise of its attitudes, rad, and of its positions, m.
     pub reference: [f64; 2],
-    /// White noise of both sensors in flight over that at rest.
+    /// White noise of both sensors in motion over that at rest.
     pub white: [f64; 2],
+    /// Whether it rests for half of each [`CYCLE_S`].
+    pub rests: bool,
 }
+
+/// A rest and a motion.
+const CYCLE_S: f64 = 6.0;
 
 /// A sum of sines.
 struct Sines(Vec<[f64; 3]>);
@@ -72,35 +78,66 @@ impl Sines {
 struct Curves {
     angles: [Sines; 3],
     position: [Sines; 3],
+    rests: bool,
 }
 
 impl Curves {
-    fn new(random: &mut Random) -> Self {
+    fn new(random: &mut Random, rests: bool) -> Self {
         let angles = [(0.4, [0.1, 0.7]), (0.4, [0.1, 0.7]), (1.5, [0.05, 0.3])];
         Self {
             angles: angles.map(|(size, hz)| Sines::new(random, 4, size, hz)),
             position: [1.0, 1.0, 0.5].map(|size| Sines::new(random, 4, size, [0.05, 0.5])),
+            rests,
         }
     }
 
+    /// Where on the curves the unit is at `t`, and the first and second derivative of that: in a motion it goes as far as it would have without the rest.
+    fn place(&self, t: f64) -> [f64; 3] {
+        if !self.rests {
+            return [t, 1.0, 0.0];
+        }
+        let (cycles, half) = ((t / CYCLE_S).floor(), 0.5 * CYCLE_S);
+        let moved = (t - cycles * CYCLE_S - half).max(0.0);
+        let turn = std::f64::consts::TAU / half;
+        let (sin, cos) = (turn * moved).sin_cos();
+        let begun = cycles * CYCLE_S;
+        [
+            begun + 2.0 * (moved - sin / turn),
+            2.0 * (1.0 - cos),
+            2.0 * turn * sin,
+        ]
+    }
+
+    /// Value, first and second derivative by time of a curve.
+    fn of(&self, curve: &Sines, t: f64) -> [f64; 3] {
+        let [place, speed, faster] = self.place(t);
+        let [value, first, second] = curve.at(place);
+        [
+            value,
+            first * speed,
+            second * speed * speed + first * faster,
+        ]
+    }
+
     fn attitude(&self, t: f64) -> Rotation3<f64> {
-        let [roll, pitch, yaw] = [0, 1, 2].map(|k| self.angles[k].at(t)[0]);
+        let [roll, pitch, yaw] = [0, 1, 2].map(|k| self.of(&self.angles[k], t)[0]);
         Rotation3::from_euler_angles(roll, pitch, yaw)
     }
 
     fn position(&self, t: f64) -> Vector3<f64> {
-        Vector3::from_fn(|k, _| self.position[k].at(t)[0])
+        Vector3::from_fn(|k, _| self.of(&self.position[k], t)[0])
     }
 
     /// Rate and specific force in axes of the unit; the rate by the derivatives of the angles (Titterton and Weston, 3.6.3).
     fn inputs(&self, t: f64) -> [Vector3<f64>; 2] {
-        let [[roll, p, _], [pitch, q, _], [_, r, _]] = [0, 1, 2].map(|k| self.angles[k].at(t));
+        let [[roll, p, _], [pitch, q, _], [_, r, _]] =
+            [0, 1, 2].map(|k| self.of(&self.angles[k], t));
         let rate = Vector3::new(
             p - r * pitch.sin(),
             q * roll.cos() + r * pitch.cos() * roll.sin(),
             -q * roll.sin() + r * pitch.cos() * roll.cos(),
         );
-        let acceleration = Vector3::from_fn(|k, _| self.position[k].at(t)[2]);
+        let acceleration = Vector3::from_fn(|k, _| self.of(&self.position[k], t)[2]);
         let force = self.attitude(t).inverse() * (acceleration + Vector3::z() * GRAVITY);
         [rate, force]
     }
@@ -135,20 +172,22 @@ impl InMemory for Samples {
 impl Flight {
     /// The readings, and the trajectory as its file has it.
     pub fn flown(&self, seed: u64) -> (Recording, Trajectory) {
-        let curves = Curves::new(&mut Random::new(seed, "curves"));
+        let curves = Curves::new(&mut Random::new(seed, "curves"), self.rests);
         let mut random = Random::new(seed, "noise");
         let count = (self.duration_s * RATE_HZ) as usize;
         let mut walked = [Vector3::<f64>::zeros(); 2];
         let mut middle = walked;
         let rows = (0..count).map(|row| {
-            let inputs = curves.inputs(row as f64 / RATE_HZ);
+            let t = row as f64 / RATE_HZ;
+            let (inputs, moves) = (curves.inputs(t), curves.place(t)[1] > 0.0);
             if row == count / 2 {
                 middle = walked;
             }
             std::array::from_fn(|k| {
                 let (s, axis) = (k / 3, k % 3);
                 walked[s][axis] += WALK[s] / RATE_HZ.sqrt() * random.normal();
-                let white = self.white[s] * WHITE[s] * RATE_HZ.sqrt() * random.normal();
+                let more = if moves { self.white[s] } else { 1.0 };
+                let white = more * WHITE[s] * RATE_HZ.sqrt() * random.normal();
                 inputs[s][axis] + self.bias[s][axis] + walked[s][axis] + white
             })
         });
@@ -162,6 +201,15 @@ impl Flight {
         let manifest = Manifest::new("flight", RATE_HZ, GRAVITY, RawUnit::Si, Reference::Gravity);
         let recording = Recording::in_memory(manifest, Arc::new(samples)).expect("a recording");
         (recording, self.trajectory(&curves, &mut random))
+    }
+
+    /// White noise over that at rest in a segment of `segment_s`, if it is `white` in motion: a segment between rests includes some rest on both sides.
+    pub fn in_segment(&self, white: f64, segment_s: f64) -> f64 {
+        let moving = match self.rests {
+            true => 0.5 * CYCLE_S / segment_s,
+            false => 1.0,
+        };
+        (moving * white * white + 1.0 - moving).sqrt()
     }
 
     fn trajectory(&self, curves: &Curves, random: &mut Random) -> Trajectory {

@@ -499,6 +499,13 @@ pub enum Warning {
         first_s: f64,
         channel: &'static str,
     },
+    /// Gaps, or runs of empty cells, the number of samples in them, and their share.
+    #[error("{} with {}, {:.2} % of all, bridged with the noise before each", plural(*.gaps, "gap"), plural(*.samples as u64, "lost sample"), 100.0 * .share)]
+    Bridged {
+        gaps: u64,
+        samples: usize,
+        share: f64,
+    },
     /// Gaps, the first one, s, and the data row after it; length of the segment that is used, s, and its beginning, s.
     #[error("{}, the first of {} before data row {row}; the longest segment without any is used: {} from {from_s:.3} s", plural(*.gaps, "gap"), duration(*.first_s), duration(*.length_s))]
     LongestStretch {

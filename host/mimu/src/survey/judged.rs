@@ -3,7 +3,7 @@
 use super::{Channel, Survey};
 use crate::judge::input;
 use crate::judgement::{Judgement, JudgementKind};
-use crate::quantity::{duration, plural, significant};
+use crate::quantity::{Sensor, duration, plural, significant};
 use crate::unseen::BEYOND_NOISE;
 use crate::warning::Warning;
 use mimu_allan::model::Term;
@@ -15,7 +15,8 @@ impl Judgement {
     /// The judgement of the noise of a unit in one or more recordings: the worst that their warnings and their channels lead to. `None` without a
     /// recording.
     ///
-    /// `Untested`: a channel is too short for a model, or its white noise is not seen or not to within 10 %. `Unexplained`: the terms of the model do not describe its curve.
+    /// `Untested`: a channel is too short for a model, its white noise is not seen or not to within 10 %, or what an export gets as the random walk of a sensor is
+    /// but the upper end of its interval. `Unexplained`: the terms of the model do not describe its curve.
     pub fn of_surveys(surveys: &[Survey]) -> Option<Self> {
         let by_input = surveys
             .iter()
@@ -23,6 +24,10 @@ impl Judgement {
             .filter_map(of_warning);
         let channels = || surveys.iter().flat_map(|s| &s.channels);
         let by_channel = channels().filter_map(of_channel);
+        let by_bound = Sensor::BOTH.into_iter().filter_map(|sensor| {
+            let own: Vec<&Channel> = channels().filter(|c| c.sensor == sensor).collect();
+            of_bound(sensor, &own)
+        });
         let shortest_s = surveys.iter().map(|s| s.span_s[1] - s.span_s[0]);
         let good = Self::new(
             JudgementKind::Good,
@@ -32,7 +37,7 @@ impl Judgement {
                 duration(shortest_s.reduce(f64::min)?)
             ),
         );
-        Self::worst(by_input.chain(by_channel).chain([good]))
+        Self::worst(by_input.chain(by_channel).chain(by_bound).chain([good]))
     }
 }
 
@@ -80,4 +85,20 @@ fn of_channel(channel: &Channel) -> Option<Judgement> {
     };
     let reason = format!("{}: {reason}", channel.name);
     Some(Judgement::new(JudgementKind::Untested, reason))
+}
+
+/// The judgement of the random walk that exports get, of the worst axis, if that is a bound.
+fn of_bound(sensor: Sensor, channels: &[&Channel]) -> Option<Judgement> {
+    let seen = |c: &Channel| Some(c.model.as_ref()?.get(Term::K).ok()?.value);
+    let largest = channels.iter().filter_map(|c| seen(c)).fold(0.0, f64::max);
+    let bounds = channels.iter().filter(|c| seen(c).is_none());
+    let bounds = bounds.filter_map(|c| Some((c, c.model.as_ref()?.at_most(Term::K)?)));
+    let (channel, bound) = bounds.max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let reason = format!(
+        "{}: the record does not show the {sensor}'s random walk K; exports get the upper end of its interval, {} {}: record for longer, or give it to the export",
+        channel.name,
+        significant(bound),
+        channel.unit.coefficient(Term::K)
+    );
+    (bound > largest).then(|| Judgement::new(JudgementKind::Untested, reason))
 }

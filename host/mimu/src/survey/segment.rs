@@ -1,8 +1,9 @@
-//! The samples that are used: a chosen part, without a gap.
+//! The samples that are used: a chosen part, whose short gaps are bridged.
 
 use std::ops::Range;
 
 use super::columns::Columns;
+use super::masking::{MOST, bridges};
 use crate::quantity::plural;
 use crate::signal::blocks::extent;
 use crate::warning::Warning;
@@ -35,11 +36,13 @@ const GAP_SHARE: f64 = 0.02;
 /// Relative difference from the given rate that is refused, and that causes a warning.
 const RATE_OFF: [f64; 2] = [0.02, 1e-3];
 
-/// Rows without a gap.
+/// Rows without a gap that cannot be bridged.
 #[derive(Debug, Clone)]
 pub(super) struct Segment {
     /// Rows from 0.
     pub rows: Range<usize>,
+    /// Gaps in them: the row after, counted from the first of [`Self::rows`], and the number of lost samples.
+    pub lost: Vec<(usize, usize)>,
     /// Times of the first and last, s.
     pub span_s: [f64; 2],
     /// Mean interval between time stamps, s.
@@ -73,7 +76,7 @@ impl Segment {
         )
     }
 
-    /// The longest segment of `t` without a gap; `first` is the row of the first time.
+    /// The longest segment of `t` without a gap that cannot be bridged; `first` is the row of the first time.
     fn without_gap(
         t: &[f64],
         first: usize,
@@ -141,17 +144,29 @@ impl Segment {
                 manifest_hz: rate_hz,
             });
         }
-        let mut rows = 0..t.len();
+        let mut used = (0..t.len(), Vec::new());
         if let Some(i) = first_gap {
-            let whole = longest(steps, |k| (t[k + 1] - t[k]) * rate_hz <= GAP_PERIODS);
-            rows = whole.start..whole.end + 1;
-            warnings.push(Warning::LongestStretch {
-                gaps: gaps as u64,
-                first_s: t[i] - t[i - 1],
-                row: first + i + 1,
-                length_s: rows.len() as f64 * period_s,
-                from_s: t[rows.start],
-            });
+            used = bridged(t, period_s);
+            let (rows, lost) = &used;
+            let first_s = t[i] - t[i - 1];
+            let gaps = gaps as u64;
+            let samples: usize = lost.iter().map(|(_, count)| count).sum();
+            if lost.len() as u64 == gaps {
+                let share = samples as f64 / (rows.len() + samples) as f64;
+                warnings.push(Warning::Bridged {
+                    gaps,
+                    samples,
+                    share,
+                });
+            } else {
+                warnings.push(Warning::LongestStretch {
+                    gaps,
+                    first_s,
+                    row: first + i + 1,
+                    length_s: (rows.len() + samples) as f64 * period_s,
+                    from_s: t[rows.start],
+                });
+            }
             if rows.len() < FEWEST {
                 return Err(Error::new(
                     at(i),
@@ -160,12 +175,32 @@ impl Segment {
                 ));
             }
         }
+        let (rows, lost) = used;
         Ok(Self {
             span_s: [t[rows.start], t[rows.end - 1]],
             rows: first + rows.start..first + rows.end,
+            lost,
             period_s,
         })
     }
+}
+
+/// The rows of `t` that are used, and the gaps in them that can be bridged. A gap with more than [`MOST`] of all samples divides the record, and the
+/// longest part is used; if more than that share is missing in it too, the longest segment without any gap.
+fn bridged(t: &[f64], period_s: f64) -> (Range<usize>, Vec<(usize, usize)>) {
+    let lost = |k: usize| ((t[k + 1] - t[k]) / period_s).round() as usize - 1;
+    let steps = t.len() - 1;
+    let is_gap = |k: usize| (t[k + 1] - t[k]) / period_s > GAP_PERIODS;
+    let whole = longest(steps, |k| {
+        !is_gap(k) || lost(k) as f64 <= MOST * t.len() as f64
+    });
+    let gaps = whole.clone().filter(|k| is_gap(*k));
+    let gaps: Vec<_> = gaps.map(|k| (k + 1 - whole.start, lost(k))).collect();
+    if bridges(&gaps, whole.len() + 1) {
+        return (whole.start..whole.end + 1, gaps);
+    }
+    let none = longest(steps, |k| !is_gap(k));
+    (none.start..none.end + 1, Vec::new())
 }
 
 /// The longest run of indices below `n` for which `good` holds.

@@ -1,6 +1,6 @@
 //! The samples of a channel for the computation: a segment without a gap, checked, with short disturbances masked.
 
-use super::masking::{Masked, mask};
+use super::masking::{Masked, bridge, bridges, mask};
 use super::segment::{FEWEST, Part, Segment, longest};
 use super::suitability::{Suitability, suitability};
 use crate::survey::unit::Unit;
@@ -27,7 +27,7 @@ pub(super) struct Values {
 }
 
 impl Values {
-    /// The samples of `segment` in `unit`, checked; if the channel has empty cells, its longest segment without any. A `part` that a person
+    /// The samples of `segment` in `unit`, checked, its gaps and its empty cells bridged; if there are too many empty cells, the longest segment without any. A `part` that a person
     /// chose is used unchanged; otherwise short disturbances are masked.
     pub fn of(
         mut values: Vec<f64>,
@@ -42,6 +42,20 @@ impl Values {
         values.truncate(rows.end);
         values.drain(..rows.start);
         let (mut warnings, mut from) = (Vec::new(), 0);
+        values = bridge(&values, &segment.lost);
+        let empty = empty_cells(&values);
+        if !empty.is_empty() && bridges(&empty, values.len()) {
+            let samples = empty.iter().map(|(_, count)| count).sum();
+            let (gaps, share) = (empty.len() as u64, samples as f64 / values.len() as f64);
+            values.retain(|u| u.is_finite());
+            values = bridge(&values, &empty);
+            let bridged = Warning::Bridged {
+                gaps,
+                samples,
+                share,
+            };
+            warnings.push(bridged.of_channel(i));
+        }
         if let Some(first) = values.iter().position(|u| !u.is_finite()) {
             let whole = longest(values.len(), |k| values[k].is_finite());
             let row = rows.start + first + 1;
@@ -100,4 +114,18 @@ impl Values {
             warnings,
         }))
     }
+}
+
+/// Runs of empty cells, as gaps of the cells that are not: the index of the one after the run, and the length of the run.
+fn empty_cells(values: &[f64]) -> Vec<(usize, usize)> {
+    let mut runs: Vec<(usize, usize)> = Vec::new();
+    let mut kept = 0;
+    for u in values {
+        match (u.is_finite(), runs.last_mut()) {
+            (true, _) => kept += 1,
+            (false, Some((after, count))) if *after == kept => *count += 1,
+            (false, _) => runs.push((kept, 1)),
+        }
+    }
+    runs
 }
