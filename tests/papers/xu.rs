@@ -129,14 +129,27 @@ impl Experiment {
         each.enumerate().map(read).collect()
     }
 
-    /// Sigmas of the twelve parameters for dwell means with unit noise, from the estimator's own covariance.
+    /// Sigmas of the twelve parameters for dwell means with unit noise: the root of the sum over the readings of the squared change that one of them makes.
+    ///
+    /// The estimator's own covariance would not do: it is scaled by the scatter of the one draw that it has seen.
     fn gains(&self) -> [f64; 12] {
+        let step = 1e-6;
         let mut random = Random::new(0, "xu gains");
-        let unit = averages(self.table);
-        let tiny = 1e-6;
-        let dwells = self.dwells(&unit, [tiny; 3], &mut random);
-        let found = (self.estimator)(&dwells).expect("determined").triad;
-        std::array::from_fn(|k| found.inverse_covariance[(k, k)].sqrt() / tiny)
+        let dwells = self.dwells(&averages(self.table), [step; 3], &mut random);
+        let of = |dwells: &[Observation]| {
+            let found = (self.estimator)(dwells).expect("determined").triad.inverse;
+            mimu::triad::vector(&found.matrix, &found.offset)
+        };
+        let (plain, mut squares) = (of(&dwells), [0.0; 12]);
+        for reading in 0..3 * dwells.len() {
+            let mut moved = dwells.clone();
+            moved[reading / 3].raw[reading % 3] += step;
+            let change = (of(&moved) - plain) / step;
+            for (square, by) in squares.iter_mut().zip(change.iter()) {
+                *square += by * by;
+            }
+        }
+        squares.map(f64::sqrt)
     }
 
     /// For each axis the noise of a dwell mean that explains as much of the five repeats as possible, and for each parameter the remaining scatter.

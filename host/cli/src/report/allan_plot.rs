@@ -87,7 +87,7 @@ fn panel(result: &AllanResult, sensor: Sensor, channels: &[&ChannelResult]) -> M
     let mut curves: Vec<Markup> = Vec::new();
     for (class, channel) in CLASSES.iter().zip(channels) {
         curves.push(line(class, curve(&channel.tau_s, &channel.adev)));
-        key.push(((*class).into(), channel.name.into()));
+        key.push(((*class).into(), with_values(channel)));
         if let Some(quiet) = &channel.adev_without_lines {
             let class = format!("{class} quiet");
             curves.push(line(&class, curve(&channel.tau_s, quiet)));
@@ -107,6 +107,13 @@ fn panel(result: &AllanResult, sensor: Sensor, channels: &[&ChannelResult]) -> M
     }
     if models(channels).next().is_some() {
         key.push(("model".into(), "models".into()));
+        key.push((
+            MARK.into(),
+            "coefficients: N at 1 s, K at 3 s, B at the floor".into(),
+        ));
+    }
+    if channels.iter().any(|c| !c.lines.is_empty()) {
+        key.push((WEDGE.into(), "lines of the spectrum".into()));
     }
     html! {
         (frame.grid(&title, &decades(&x), &decades(&y), true))
@@ -123,6 +130,29 @@ fn panel(result: &AllanResult, sensor: Sensor, channels: &[&ChannelResult]) -> M
         (line_marks(&frame, channels, by))
         (legend(&frame, &key))
     }
+}
+
+/// Entries of the legend that are no lines.
+const MARK: &str = "mark";
+const WEDGE: &str = "wedge";
+
+/// Name of a channel with its coefficients.
+fn with_values(channel: &ChannelResult) -> String {
+    let each = [Term::N, Term::B, Term::K].into_iter().filter_map(|term| {
+        let own = channel.get(term).ok()?;
+        let value = readable::noise(&own.unit)[0].write(own.value);
+        Some(format!("{} {value}", term.letter()))
+    });
+    let each: Vec<String> = each.collect();
+    match each.is_empty() {
+        true => channel.name.into(),
+        false => format!("{}: {}", channel.name, each.join(", ")),
+    }
+}
+
+/// A wedge whose tip is at a place, pixels.
+fn wedge(x: f64, y: f64) -> Markup {
+    html! { path class="line" d={ "M" (px(x - 4.0)) " " (px(y - 7.0)) "L" (px(x)) " " (px(y)) "L" (px(x + 4.0)) " " (px(y - 7.0)) } {} }
 }
 
 /// Averaging time at which a sinusoid of frequency 1 increases an Allan deviation most: the maximum of `sin²(π τ)/(π τ)`.
@@ -176,13 +206,13 @@ fn line_marks(frame: &Frame, channels: &[&ChannelResult], by: f64) -> Markup {
     let places: Vec<_> = marks.iter().filter_map(&mut place).collect();
     html! {
         @for (f, [x, y], [left, bottom]) in places {
-            path class="line" d={ "M" (px(x - 4.0)) " " (px(y - 7.0)) "L" (px(x)) " " (px(y)) "L" (px(x + 4.0)) " " (px(y - 7.0)) } {}
+            (wedge(x, y))
             text class="tick" x=(px(left)) y=(px(bottom)) { (significant(f)) " Hz" }
         }
     }
 }
 
-/// Marks a coefficient: a circle for each channel, and one letter above the highest circle.
+/// Marks a coefficient: a circle for each channel, and one letter above the highest circle; their values are in the legend.
 fn marks(frame: &Frame, channels: &[&ChannelResult], term: Term, by: f64) -> Markup {
     let marks: Vec<(usize, f64, f64)> = models(channels)
         .filter_map(|(k, channel, model)| Some((k, read_at(channel, model, term)?)))
@@ -211,7 +241,11 @@ fn legend(frame: &Frame, key: &[(String, String)]) -> Markup {
         rect class="key" x=(px(left)) y=(px(top)) width=(px(width)) height=(px(height)) {}
         @for (row, (class, name)) in key.iter().enumerate() {
             @let y = top + 14.0 + 18.0 * row as f64;
-            path class=(class) d={ "M" (px(left + 8.0)) " " (px(y)) "h24" } {}
+            @match class.as_str() {
+                MARK => circle class="line" cx=(px(left + 20.0)) cy=(px(y)) r="4" {},
+                WEDGE => (wedge(left + 20.0, y + 4.0)),
+                _ => path class=(class) d={ "M" (px(left + 8.0)) " " (px(y)) "h24" } {},
+            }
             text x=(px(left + 38.0)) y=(px(y + 5.0)) { (name) }
         }
     }

@@ -86,7 +86,8 @@ impl Frame {
 
     /// Name of the ordinate, rotated, next to the numbers.
     pub fn y_name(&self, name: &str) -> Markup {
-        let (x, y) = (12.0, 0.5 * (self.down.start + self.down.end));
+        // Its letters reach 12 pixels to the left of it.
+        let (x, y) = (16.0, 0.5 * (self.down.start + self.down.end));
         html! {
             text class="name" x=(px(x)) y=(px(y)) text-anchor="middle"
                 transform={ "rotate(-90 " (px(x)) " " (px(y)) ")" } { (name) }
