@@ -13,6 +13,8 @@ use crate::readable::STANDARD_GRAVITY;
 
 /// Rise of the log-likelihood that a cause has to make: by chance one of the fifteen makes it in one recording of fifty.
 const RISE: f64 = 3.0;
+/// Standard deviations of an element of a matrix whose error is seen: by chance one of nine is in one recording of forty.
+const SEEN: f64 = 3.0;
 /// Causes that are looked for, one after the other.
 const MOST: usize = 8;
 /// Candidates that are fitted together with those found before.
@@ -34,9 +36,11 @@ pub(super) fn of(session: &Session) -> Attributed {
     };
     let mut best = search.fitted(session.known(true));
     let mut included: Vec<(usize, f64)> = Vec::new();
+    let mut unseen: Vec<usize> = Vec::new();
     while included.len() < MOST {
         let free: Vec<usize> = included.iter().map(|(k, _)| *k).collect();
-        let candidates = (0..session.components.len()).filter(|k| !free.contains(k));
+        let candidates =
+            (0..session.components.len()).filter(|k| !free.contains(k) && !unseen.contains(k));
         let candidates: Vec<usize> = candidates.collect();
         let tried = candidates.into_par_iter();
         let tried = tried.map(|k| (k, search.along(best.clone(), k, false)));
@@ -53,6 +57,12 @@ pub(super) fn of(session: &Session) -> Attributed {
         let rise = fitted.log_likelihood - best.log_likelihood;
         if rise < RISE {
             break;
+        }
+        if let Kind::Matrix(sensor) = session.components[k].kind
+            && !is_seen(session, &fitted, sensor)
+        {
+            unseen.push(k);
+            continue;
         }
         included.push((k, 2.0 * rise));
         best = fitted;
@@ -110,6 +120,15 @@ fn attributed(session: &Session, best: &Fitted, included: &[(usize, f64)]) -> At
             accel: share(Sensor::Accel, accel),
         },
     }
+}
+
+/// Whether the error of the matrix of `sensor` is itself seen, on an element at least: where the force hardly changes, a large one and a bias are alike.
+fn is_seen(session: &Session, fitted: &Fitted, sensor: Sensor) -> bool {
+    let Some(estimated) = session.smoothed(&fitted.model) else {
+        return false;
+    };
+    let own = estimated.middle();
+    super::state::matrix(sensor).any(|k| own.value(k).abs() > SEEN * own.sigma(k))
 }
 
 /// The estimated relative error of the matrix of `sensor` on its worst axis: the norm of a row of `E`, where `E C` is the error of C.
