@@ -238,7 +238,7 @@ def allan(
 ) -> Allan: ...
 def noise_in_use(
     recording: Recording,
-    calibration: Calibration,
+    calibration: Calibration | None,
     noise: Noise,
     *,
     trajectory: _Path | None,

@@ -141,7 +141,7 @@ class NoiseInUse(Result):
 
 def noise_in_use(
     recording: Recording,
-    calibration: Calibration | Fit | Diagnosis | ThermalFit,
+    calibration: Calibration | Fit | Diagnosis | ThermalFit | None,
     noise: Noise | Allan,
     *,
     trajectory: str | os.PathLike[str] | None = None,
@@ -155,8 +155,8 @@ def noise_in_use(
     ----------
     recording : Recording
         In motion, with rests before and after each motion, or with a ``trajectory``. It must not be the one that the calibration was made from.
-    calibration : Calibration, Fit, Diagnosis or thermal.ThermalFit
-        Of the unit.
+    calibration : Calibration, Fit, Diagnosis or thermal.ThermalFit, or None
+        Of the unit; None for readings in rad/s and m/s² as they are.
     noise : Noise or Allan
         Of the unit at rest.
     trajectory, trajectory_zero
@@ -171,7 +171,8 @@ def noise_in_use(
     """
     given = noise_of(noise)
     assert given is not None
+    by = None if calibration is None else calibration_of(calibration)
     found = _mimu.noise_in_use(
-        recording, calibration_of(calibration), given, trajectory=trajectory, trajectory_zero=trajectory_zero, still=still, steps=steps
+        recording, by, given, trajectory=trajectory, trajectory_zero=trajectory_zero, still=still, steps=steps
     )
     return NoiseInUse(found)

@@ -117,7 +117,7 @@ impl NoiseInUse {
 pub(crate) fn noise_in_use(
     py: Python<'_>,
     recording: &Recording,
-    calibration: &Calibration,
+    calibration: Option<&Calibration>,
     noise: &Noise,
     trajectory: Option<PathBuf>,
     trajectory_zero: f64,
@@ -125,10 +125,17 @@ pub(crate) fn noise_in_use(
     steps: Option<&str>,
 ) -> PyResult<NoiseInUse> {
     let by = Preparation::of(still, steps, None, None)?;
-    let (source, model) = (recording.source.clone(), calibration.model.clone());
+    let (source, given) = (
+        recording.source.clone(),
+        calibration.map(|c| c.model.clone()),
+    );
     let noise = noise.file.clone();
     computed(py, move || {
         let samples = source.samples()?;
+        let model = match given {
+            Some(given) => given,
+            None => Arc::new(mimu::Calibration::of_si(&samples.manifest)?),
+        };
         let found = match trajectory {
             Some(path) => {
                 let poses = Trajectory::read(&path)?.counted_from(trajectory_zero);

@@ -499,6 +499,9 @@ pub enum Warning {
         first_s: f64,
         channel: &'static str,
     },
+    /// Share of the samples that are one of two codes.
+    #[error("{:.0} % of the samples are one of two neighbouring codes: the step is several times the noise, and the curve shows the rounding as much as the sensor (B may be wrong by a third); record with a smaller range or more bits", 100.0 * .share)]
+    CoarseReadings { share: f64 },
     /// Gaps, or runs of empty cells, the number of samples in them, and their share.
     #[error("{} with {}, {:.2} % of all, bridged with the noise before each", plural(*.gaps, "gap"), plural(*.samples as u64, "lost sample"), 100.0 * .share)]
     Bridged {

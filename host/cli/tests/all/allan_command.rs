@@ -436,28 +436,72 @@ fn readings_in_si_that_are_none_are_said() {
 }
 
 #[test]
-fn the_longest_stretch_without_a_gap_or_an_empty_cell_is_used_and_told_of() {
+fn short_gaps_and_empty_cells_are_bridged_and_a_long_gap_divides_the_record() {
     let folder = tempfile::tempdir().unwrap();
     let mut rows = at_rest(6000);
     rows[1500][2] = f64::NAN;
-    for row in &mut rows[5000..] {
+    rows.drain(2000..2010);
+    write(folder.path(), &rows);
+    let json = || -> serde_json::Value {
+        serde_json::from_str(&done(folder.path(), "allan r --json -")).unwrap()
+    };
+    let samples =
+        |json: &serde_json::Value, i: usize| json["channels"][i]["samples"].as_u64().unwrap();
+    let bridged = json();
+    assert_eq!([samples(&bridged, 0), samples(&bridged, 1)], [6000, 6000]);
+    let warnings = bridged["warnings"].to_string();
+    assert!(
+        warnings.contains("1 gap with 10 lost samples")
+            && warnings.contains("1 gap with 1 lost sample,"),
+        "{warnings}"
+    );
+    for row in &mut rows[4990..] {
         row[0] += 3.0;
     }
     write(folder.path(), &rows);
-    let json: serde_json::Value =
-        serde_json::from_str(&done(folder.path(), "allan r --json -")).unwrap();
-    let samples = |i: usize| json["channels"][i]["samples"].as_u64().unwrap();
-    assert_eq!([samples(0), samples(1)], [5000, 3499]);
+    let json = json();
+    assert_eq!(samples(&json, 0), 5000);
     let warnings = json["warnings"].to_string();
-    assert!(
-        warnings.contains("before data row 5001") && warnings.contains("data row 1501"),
-        "{warnings}"
-    );
+    assert!(warnings.contains("before data row 2001"), "{warnings}");
     // `--from` selects the end instead.
     let json: serde_json::Value =
         serde_json::from_str(&done(folder.path(), "allan r --from 53 --json -")).unwrap();
     assert_eq!(json["channels"][0]["samples"], 1000);
     assert_eq!(json["warnings"].as_array().unwrap().len(), 0);
+}
+
+#[test]
+fn a_bound_that_is_exported_and_codes_coarser_than_the_noise_are_untested() {
+    let folder = tempfile::tempdir().unwrap();
+    let judgement = || {
+        let json: serde_json::Value =
+            serde_json::from_str(&done(folder.path(), "allan r --json -")).unwrap();
+        let own = &json["judgement"];
+        (
+            own["kind"].as_str().unwrap().to_owned(),
+            own["reason"].to_string(),
+        )
+    };
+    let mut rows = at_rest(6000);
+    write(folder.path(), &rows);
+    let (kind, reason) = judgement();
+    assert!(
+        kind == "untested" && reason.contains("random walk K"),
+        "{kind}: {reason}"
+    );
+    let column: Vec<f64> = rows.iter().map(|row| row[1]).collect();
+    let mean = column.iter().sum::<f64>() / column.len() as f64;
+    let variance = column.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / column.len() as f64;
+    let step = 4.0 * variance.sqrt();
+    for row in &mut rows {
+        row[1] = (row[1] / step).round() * step;
+    }
+    write(folder.path(), &rows);
+    let (kind, reason) = judgement();
+    assert!(
+        kind == "untested" && reason.contains("neighbouring codes"),
+        "{kind}: {reason}"
+    );
 }
 
 #[test]

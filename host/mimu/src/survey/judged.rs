@@ -15,8 +15,8 @@ impl Judgement {
     /// The judgement of the noise of a unit in one or more recordings: the worst that their warnings and their channels lead to. `None` without a
     /// recording.
     ///
-    /// `Untested`: a channel is too short for a model, its white noise is not seen or not to within 10 %, or what an export gets as the random walk of a sensor is
-    /// but the upper end of its interval. `Unexplained`: the terms of the model do not describe its curve.
+    /// `Untested`: a channel is too short for a model, its white noise is not seen or not to within 10 %, its codes are coarser than its noise, or what an export gets as the random walk of
+    /// a sensor is but the upper end of its interval. `Unexplained`: the terms of the model do not describe its curve.
     pub fn of_surveys(surveys: &[Survey]) -> Option<Self> {
         let by_input = surveys
             .iter()
@@ -46,6 +46,9 @@ fn of_warning(warning: &Warning) -> Option<Judgement> {
         // Recordings and calibrations of one unit often have different names; another unit shows in the specific force.
         Warning::OtherDevice { .. } => None,
         Warning::Moves { .. } => Some(JudgementKind::Suspect),
+        Warning::Channel { warning, .. } if matches!(**warning, Warning::CoarseReadings { .. }) => {
+            Some(JudgementKind::Untested)
+        }
         other => input::of_warning(other),
     };
     Some(Judgement::new(kind?, warning))

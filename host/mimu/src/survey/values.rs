@@ -86,6 +86,10 @@ impl Values {
         {
             return Ok(Read::Dead(dead));
         }
+        let share = share_of_two_codes(&values);
+        if share > COARSE {
+            warnings.push(Warning::CoarseReadings { share }.of_channel(i));
+        }
         let mut suitability = suitability(&values, i, period_s, &place)?;
         let masked = match part {
             Part::Whole => mask(&mut values, &mut suitability, period_s),
@@ -114,6 +118,31 @@ impl Values {
             warnings,
         }))
     }
+}
+
+/// If two codes have more than this share of the samples, noise does not smooth the steps: their size is then at least 2.6 standard deviations if the level is
+/// between two codes, and 3.9 if it is on one. From four on, a level that wanders by half a step is seen with a third of its size, or with twice that.
+const COARSE: f64 = 0.975;
+/// Windows over which codes are counted, their length, samples: a level wanders through codes over a whole record.
+const WINDOWS: usize = 64;
+const WINDOW: usize = 256;
+
+/// The share of the samples that are one of the two commonest values of their window, on average.
+fn share_of_two_codes(values: &[f64]) -> f64 {
+    let all = values.len() / WINDOW;
+    let windows = values
+        .chunks_exact(WINDOW)
+        .step_by(all.div_ceil(WINDOWS).max(1));
+    let (mut sum, mut count) = (0.0, 0.0);
+    for window in windows {
+        let mut sorted = window.to_vec();
+        sorted.sort_by(f64::total_cmp);
+        let mut runs: Vec<usize> = sorted.chunk_by(|a, b| a == b).map(<[f64]>::len).collect();
+        runs.sort_unstable_by(|a, b| b.cmp(a));
+        sum += runs.iter().take(2).sum::<usize>() as f64 / WINDOW as f64;
+        count += 1.0;
+    }
+    if count > 0.0 { sum / count } else { 0.0 }
 }
 
 /// Runs of empty cells, as gaps of the cells that are not: the index of the one after the run, and the length of the run.
