@@ -510,7 +510,7 @@ pub enum Warning {
         share: f64,
     },
     /// Gaps, the first one, s, and the data row after it; length of the segment that is used, s, and its beginning, s.
-    #[error("{}, the first of {} before data row {row}; the longest segment without any is used: {} from {from_s:.3} s", plural(*.gaps, "gap"), duration(*.first_s), duration(*.length_s))]
+    #[error("{}, the first of {} before data row {row}; the longest segment without one that cannot be bridged is used: {} from {from_s:.3} s", plural(*.gaps, "gap"), duration(*.first_s), duration(*.length_s))]
     LongestStretch {
         gaps: u64,
         first_s: f64,
