@@ -183,7 +183,12 @@ def shapes():
     lines = simple("t", A, GY).splitlines()
     yield "the names once more in the middle", "\n".join(lines[:2000] + [lines[0]] + lines[2000:]) + "\n", "any"
     yield "a cut last row", simple("t", A, GY)[:-25], "any"
-    yield "JSON lines", "\n".join(f'{{"t": {t:.3f}, "ax": {f[0]:.4f}, "ay": {f[1]:.4f}, "az": {f[2]:.4f}}}' for t, f in zip(T, F, strict=True)), "any"
+    yield "JSON lines", "\n".join(f'{{"t":{t:.2f},"acc":[{f[0]:.4f},{f[1]:.4f},{f[2]:.4f}],"gyro":{{"x":{w[0]:.5f},"y":{w[1]:.5f},"z":{w[2]:.5f}}}}}' for t, f, w in zip(T, F, W, strict=True)), "si"
+    yield "ESP-IDF's log", "\n".join(f"I ({1000 * t:.0f}) IMU: {', '.join(f'{v:.5f}' for v in (*f, *w))}" for t, f, w in zip(T, F, W, strict=True)), "si"
+    yield "Teleplot", "\n".join(f">{n}:{v:.5f}" for row in zip(T, *xyz(F), *xyz(W), strict=True) for n, v in zip(["t", *A, *GY], row, strict=True)), "si"
+    yield "ustime", simple("ustime", A, GY, t=T * 1e6 + 2e9), "si"
+    yield "ax_g, gx_dps", simple("t", names("a{0}_g"), names("g{0}_dps"), a=1 / G, w=dps), "si"
+    yield "roll_rate", table(["t", *A, "roll_rate", "pitch_rate", "yaw_rate"], [T] + xyz(F) + xyz(W)), "si"
 
 
 def outcome(folder, texts):

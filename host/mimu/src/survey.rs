@@ -180,7 +180,7 @@ pub fn survey(
     found.warn_if_suspect(recording, calibration);
     found.refuse_motion(&place)?;
     Ok(Survey {
-        recording: recording.directory.display().to_string(),
+        recording: recording.name(),
         device: recording.manifest.device.clone(),
         temp_c: temperature.as_ref().map(|t| t.mean_c),
         sample_rate_hz: 1.0 / segment.period_s,

@@ -138,6 +138,14 @@ impl Recording {
         })
     }
 
+    /// Its folder, or the log that it was imported from.
+    pub fn name(&self) -> String {
+        match self.place == self.samples.display().to_string() {
+            true => self.directory.display().to_string(),
+            false => self.place.clone(),
+        }
+    }
+
     /// A recording of samples in the memory of another program. Messages use the name of its device.
     ///
     /// # Errors

@@ -291,6 +291,8 @@ fn messages_about_a_log_name_the_log() {
     assert!(error.starts_with("mimu: still.csv, "), "{error}");
     let found = json(&right(at, "fit log.csv --json -"));
     assert!(!found.to_string().contains("samples.parquet"), "{found}");
+    let found = json(&right(at, "allan still.csv --units m/s2,rad/s --json -"));
+    assert!(!found.to_string().contains("/still.csv"), "{found}");
 }
 
 #[test]

@@ -20,7 +20,7 @@ pub fn survey_all(
         let mine = same(recording);
         if mine.is_some() && recordings[..i].iter().any(|r| same(r) == mine) {
             return Err(Error::new(
-                recording.directory.display(),
+                recording.name(),
                 "the recording is given twice",
                 "leave one out",
             ));

@@ -462,9 +462,7 @@ fn rate_of_an_angle(words: &[String]) -> Option<usize> {
     let joined = words.concat();
     let rest = |angle: &&str| joined.strip_prefix(*angle).or(joined.strip_suffix(*angle));
     let is_rate = |angle: &&str| rest(angle).is_some_and(|rest| RATE.contains(&rest));
-    ["roll", "pitch", "yaw"]
-        .iter()
-        .position(|angle| is_rate(&angle))
+    ["roll", "pitch", "yaw"].iter().position(is_rate)
 }
 
 /// Letters before an axis that mean no inertial sensor: magnetometer, quaternion, velocity, position, attitude, field.
@@ -638,7 +636,7 @@ pub(super) fn clock_unit_within(name: &str) -> Option<Decimal> {
     };
     // A lone s may be the end of any word.
     let finer = CLOCKS.iter().filter(|(unit, _)| *unit != Decimal::Second);
-    let mut found = finer.filter(|(_, spellings)| spellings.iter().any(|s| within(&s)));
+    let mut found = finer.filter(|(_, spellings)| spellings.iter().any(&within));
     found.next().map(|(unit, _)| *unit)
 }
 

@@ -218,7 +218,7 @@ fn dumps_of_bags_and_of_data_frames_are_understood() {
             let (s, ns) = parts(i);
             format!(
                 "{:.4},{i},{s},{ns},imu,{}\n",
-                1_600_000_000.9013 + t,
+                1_600_000_000.901_3 + t,
                 message(force, rate)
             )
         },
@@ -267,7 +267,8 @@ fn dumps_of_bags_and_of_data_frames_are_understood() {
 #[test]
 fn lines_with_labels_are_read_and_a_proposed_list_has_as_many_names_as_they_have_cells() {
     let counts = |values: [f64; 3], factor: f64| values.map(|v| (v * factor).round().to_string());
-    let lines: [(&str, fn(usize, f64, [f64; 3], [f64; 3]) -> String); 4] = [
+    type Write = fn(usize, f64, [f64; 3], [f64; 3]) -> String;
+    let lines: [(&str, Write); 4] = [
         ("esp", |i, _, f, w| {
             format!(
                 "I ({}) IMU: {} {}\n",
