@@ -93,8 +93,17 @@ pub(crate) struct WholeTurnArgs {
     #[arg(long = "whole-turns", value_name = "N", num_args = 0..=1, require_equals = true)]
     turns: Option<Option<u32>>,
     /// With --whole-turns: how well the unit is put back, degrees, half-width of the 95 % interval of its heading [default: 1]
-    #[arg(long, value_name = "DEG", requires = "turns")]
+    #[arg(long, value_name = "DEG", requires = "turns", value_parser = degrees)]
     placement: Option<f64>,
+}
+
+/// An angle in degrees, with or without its unit: `1`, `1deg`.
+pub(crate) fn degrees(text: &str) -> std::result::Result<f64, String> {
+    let number = text.trim_end_matches('°').trim_end_matches("deg");
+    number
+        .trim()
+        .parse()
+        .map_err(|_| "write degrees, such as 1deg".into())
 }
 
 /// What the two options state of whole turns, if there are any.

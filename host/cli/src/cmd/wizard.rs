@@ -25,7 +25,7 @@ use mimu_wizard::text::Text;
 use mimu_wizard::text_line::Columns;
 
 use crate::arguments::targets;
-use crate::arguments::{JsonArgs, whole_turns};
+use crate::arguments::{JsonArgs, degrees, whole_turns};
 use crate::cmd::design::number;
 use crate::output::now;
 use crate::report::{self, Made};
@@ -124,7 +124,7 @@ struct SpinArgs {
     #[arg(long = "whole-turns", value_name = "N", num_args = 0..=1, require_equals = true)]
     turns: Option<Option<u32>>,
     /// With --whole-turns: how well the unit is put back, degrees, half-width of the 95 % interval of its heading [default: 1]
-    #[arg(long, value_name = "DEG", requires = "turns")]
+    #[arg(long, value_name = "DEG", requires = "turns", value_parser = degrees)]
     placement: Option<f64>,
 }
 
