@@ -51,12 +51,12 @@ impl ThermalFit {
                     own / noise_floor
                 };
                 let all = self.judged.present();
-                let all = all.map(|(sensor, judged)| (sensor, in_sample(judged)));
-                let (sensor, worst) = all.max_by(|a, b| a.1.total_cmp(&b.1))?;
+                let all = all.map(|(sensor, judged)| (sensor, in_sample(judged), judged));
+                let (sensor, worst, judged) = all.max_by(|a, b| a.1.total_cmp(&b.1))?;
                 let reason = format!(
-                    "{}: the curves err by {} times the noise in the recordings that they were fitted to",
-                    sensor,
-                    significant(worst)
+                    "{sensor}: the curves err by {} times the noise in the recordings that they were fitted to, {}",
+                    significant(worst),
+                    where_most(judged)?
                 );
                 Some(Judgement::new(JudgementKind::Misfit, reason))
             }

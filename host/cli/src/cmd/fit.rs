@@ -129,7 +129,10 @@ const CHECK: &str =
 pub(crate) fn run(args: &FitArgs) -> Result<Status> {
     // Before anything is computed: a part that is not known, and a file that would be replaced.
     args.part.part()?;
-    args.writing.check(args.output.as_deref())?;
+    let new = args.output.as_deref();
+    // One that is an input is refused as such.
+    let new = new.filter(|new| !args.recordings.iter().any(|r| new.starts_with(r)));
+    args.writing.check(new)?;
     if let (Some(prior), [_, second, ..]) = (&args.prior, &args.recordings[..]) {
         return Err(Error::new(
             prior.display(),
@@ -165,6 +168,7 @@ fn prepared(args: &FitArgs, recording: &Path) -> Result<Prepared> {
     let inputs = [args.noise.file.as_deref(), args.prior.as_deref()];
     let search = args.still.search();
     let prepared = read_samples_or_means(recording, &args.log, search, &outputs, &inputs)?;
+    args.writing.check(args.output.as_deref())?;
     let prepared = args.keep.apply(args.noise.apply(prepared)?);
     let prepared = args.whole.apply(prepared)?;
     let prepared = match &args.reference_error {

@@ -240,12 +240,6 @@ fn what_cannot_be_right_is_refused_in_one_line_and_leaves_no_file() {
             &["no usable dwell has a known input", "ref_ columns"],
         ),
         (
-            "a table recording by gravity",
-            on_table,
-            |s| s.set("reference", "\"gravity\""),
-            &["accel"],
-        ),
-        (
             "gravity without an accelerometer",
             by_hand,
             |s| {
