@@ -397,9 +397,10 @@ impl Look {
                 let about = format!(
                     "no column is known to be a time; {name:?} grows evenly, and may be one"
                 );
-                let answer = match list.split_once('=') {
-                    Some(_) => list.replacen("--columns ", &format!("--columns t_s={name},"), 1),
-                    None => "--rate-hz RATE".into(),
+                let known = list.trim_start_matches("--columns ").trim_matches('\'');
+                let answer = match known.contains('=') && self.files.len() == 1 {
+                    true => format!("--columns 't_s={name},{known}'"),
+                    false => "--rate-hz RATE".into(),
                 };
                 self.ask(about, &answer);
             }
@@ -473,9 +474,10 @@ impl Look {
         } else if look.guess.grows
             && let Err([fine, coarse]) = Unit::recognise(&Seen::of(&times))
         {
+            let [fine, coarse] = [fine, coarse].map(|unit| format!("{unit} ({})", unit.symbol()));
             let about =
-                format!("the column {name:?} grows evenly, as a time in {fine} or {coarse}");
-            self.ask(about, &format!("--time-unit {}", fine.symbol()));
+                format!("the column {name:?} grows evenly, as a time in {fine} or {coarse} would");
+            self.ask(about, "--time-unit UNIT");
         }
     }
 

@@ -98,15 +98,20 @@ fn a_first_column_that_grows_evenly_is_the_time_under_any_name() {
         );
         assert_eq!(look.gyro.unwrap().unit, Some("rad/s"), "{name}");
     }
-    // 100 000 in a row are 10 Hz in microseconds, or 10 kHz in nanoseconds.
+    // A million in a row are 1 kHz in nanoseconds, or 1 Hz in microseconds.
     let says = asked(&named("laufzeit", 1e8));
+    let both = "in nanoseconds (ns) or microseconds (us)";
     assert!(
-        says.contains("in nanoseconds or milliseconds") || says.contains("--time-unit"),
+        says.contains(both) && says.contains("--time-unit UNIT"),
         "{says}"
     );
     // One by one it is a counter, and under the name of something else no time.
     assert!(asked(&named("tick", 100.0)).contains("counts the rows one by one"));
-    assert!(asked(&named("altitude", 1e3)).contains("t_s=altitude,accel_x=ax"));
+    let says = asked(&named("altitude in m", 1e3));
+    assert!(
+        says.contains("--columns 't_s=altitude in m,accel_x=ax"),
+        "{says}"
+    );
 }
 
 #[test]
