@@ -9,7 +9,6 @@
 pub mod digits;
 pub mod error;
 pub mod health;
-pub mod labelled;
 pub mod result_file;
 pub mod signed_low_byte;
 pub mod units;
@@ -62,7 +61,7 @@ pub use import::{
     BrokenKind, BrokenLimit, BrokenRows, Chosen, ColumnList, CommentSigns, CopiedTable, Decimal,
     Face, ImportOptions, ImportSummary, Inputs, Jitter, Offset, PoseMean, PoseMeans, Preset,
     PresetUse, Preview, Role, Rounds, RowFilter, RowRange, Scale, SkippedLines, TimeSummary,
-    TwosComplement, Zero, import, is_log, look, preview,
+    TwosComplement, Zero, import, is_log, labelled, look, preview,
 };
 pub use in_memory::{InMemory, usual_rate_hz};
 pub use manifest::{

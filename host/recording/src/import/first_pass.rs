@@ -6,19 +6,10 @@ use super::assignment::Scale;
 use super::foreign::{ForeignFile, HowToRead};
 use super::log::{self, is_log};
 use super::row::Row;
+use super::row_limit::{MOST_ROWS, too_many_rows};
 use super::time::{Known, Stamps, Times};
 use crate::columns::Column;
-use crate::error::{Error, Result};
-
-/// Most rows of a file, whose times take 1.2 GB of memory: 28 h at 1 kHz. Compressed files of a few MB may hold many more.
-pub(super) const MOST_ROWS: u64 = 100_000_000;
-
-/// The refusal of a file with `count` rows.
-pub(super) fn too_many_rows(path: &Path, count: &str) -> Error {
-    let problem = format!("it has {count} rows, and at most {MOST_ROWS} fit into memory");
-    let remedy = "cut it into several files, or record at a lower rate";
-    Error::new(path.display(), problem, remedy)
-}
+use crate::error::Result;
 
 /// The times of the rows of `path`. `rate_hz` is the given rate, `joined_to` the times of the file to which this one is joined.
 ///

@@ -15,6 +15,7 @@ mod gyroflow;
 mod inputs;
 mod join;
 mod joined;
+pub mod labelled;
 mod left_out;
 mod log;
 pub mod look;
@@ -33,6 +34,7 @@ mod ros;
 mod rotation;
 mod row;
 mod row_filter;
+mod row_limit;
 mod row_range;
 mod sequence;
 mod sequence_position;
@@ -81,11 +83,6 @@ use sequence::import_sequence;
 
 use super::writer::Writer;
 use crate::error::Result;
-
-/// Whether a cell is a time of day or a date with one.
-pub(crate) fn is_calendar_time(cell: &[u8]) -> bool {
-    time::calendar_time(cell).is_some()
-}
 
 /// Imports foreign files as a recording at `out`; `progress` receives the share of the first file that has been read.
 pub fn import(

@@ -7,8 +7,8 @@ use parquet::data_type::ByteArray;
 
 use super::assignment::{ColumnList, Role};
 use super::broken::{Fault, Unreadable};
-use super::first_pass::{MOST_ROWS, too_many_rows};
 use super::row_filter::{RowFilter, RowFilters};
+use super::row_limit::{MOST_ROWS, too_many_rows};
 use super::text_table::Cells;
 use super::time::Stamp;
 use crate::cell::{is_reading, no_reading, shorten};

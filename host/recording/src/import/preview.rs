@@ -7,13 +7,13 @@ use serde::Serialize;
 
 use super::binary::{refuse_binary, without_zeros};
 use super::comment_signs::CommentSigns;
+use super::labelled::{Line, Samples, UNITS};
 use super::log::is_log;
 use super::parquet_table;
 use super::text_table::split;
 use crate::cell;
 use crate::csv_file::BOM;
 use crate::error::{Error, Result};
-use crate::labelled::{Line, Samples, UNITS};
 use crate::separator::Separator;
 
 /// Bytes that are read at the start for each row: a longer row is rare.

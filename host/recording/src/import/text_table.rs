@@ -9,13 +9,13 @@ use super::assignment::{ColumnList, Role};
 use super::binary::{refuse_binary, without_zeros};
 use super::broken::{Fault, Unreadable};
 use super::comment_signs::{CommentSigns, TextFormat};
+use super::labelled::{Samples, Taken};
 use super::row_filter::{RowFilter, RowFilters};
 use super::time::{Stamp, calendar_time};
 use crate::cell::{self, Refusal, shorten};
 use crate::columns::Column;
 use crate::csv_file::BOM;
 use crate::error::{Argument, Error, Result};
-use crate::labelled::{Samples, Taken};
 use crate::separator::Separator;
 
 /// Bytes at the start within which the data must begin.

@@ -10,7 +10,7 @@ use parquet::file::properties::WriterProperties;
 use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 use parquet::schema::parser::parse_message_type;
 
-use super::super::{Batch, ImportOptions, Manifest, RawUnit, Recording, Reference, import};
+use super::super::{Batch, Manifest, RawUnit, Recording, Reference};
 use crate::error::Result;
 
 type Group<'a> = SerializedRowGroupWriter<'a, File>;
@@ -231,25 +231,4 @@ fn a_damaged_file_is_an_error_or_other_numbers_but_no_panic_of_the_caller() {
         std::fs::write(&path, &damaged).unwrap();
         let _ = read(folder.path(), 100);
     }
-}
-
-/// A compressed file of some kB: the rows are what fills the memory.
-#[test]
-fn an_import_of_more_rows_than_fit_into_memory_is_refused_with_their_number() {
-    let folder = recording("message m { optional double t_s; }", 1, |_, group| {
-        let mut writer = group.next_column().unwrap().unwrap();
-        let nothing = vec![0; 1_000_000];
-        for _ in 0..101 {
-            let typed = writer.typed::<DoubleType>();
-            typed.write_batch(&[], Some(&nothing), None).unwrap();
-        }
-        writer.close().unwrap();
-    });
-    let file = folder.path().join("samples.parquet");
-    let options = ImportOptions::new(vec![file], 9.81, RawUnit::Count, Reference::Gravity);
-    let error = import(&options, &folder.path().join("out"), |_| ()).unwrap_err();
-    assert!(
-        error.to_string().contains("it has 101000000 rows"),
-        "{error}"
-    );
 }

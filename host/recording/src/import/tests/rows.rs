@@ -138,3 +138,28 @@ fn the_rows_before_and_after_a_fault_are_imported_apart() {
     options.rows = Some("61..".parse().unwrap());
     assert!(bench.import(&options).is_err());
 }
+
+/// A compressed file of some kB, whose rows would fill the memory.
+#[test]
+fn more_rows_than_fit_into_memory_are_refused_with_their_number() {
+    use parquet::data_type::DoubleType;
+    use parquet::file::writer::SerializedFileWriter;
+    let bench = Bench::new(&[]);
+    let path = bench.path("a.parquet");
+    let schema = parquet::schema::parser::parse_message_type("message m { optional double t_s; }");
+    let schema = std::sync::Arc::new(schema.unwrap());
+    let file = std::fs::File::create(&path).unwrap();
+    let mut writer = SerializedFileWriter::new(file, schema, Default::default()).unwrap();
+    let mut group = writer.next_row_group().unwrap();
+    let mut column = group.next_column().unwrap().unwrap();
+    let nothing = vec![0; 1_000_000];
+    for _ in 0..101 {
+        let typed = column.typed::<DoubleType>();
+        typed.write_batch(&[], Some(&nothing), None).unwrap();
+    }
+    column.close().unwrap();
+    group.close().unwrap();
+    writer.close().unwrap();
+    let error = bench.refused(&bench.options(&["a.parquet"], &["t_s=t_s"]));
+    assert!(error.contains("it has 101000000 rows"), "{error}");
+}

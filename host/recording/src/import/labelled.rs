@@ -7,7 +7,7 @@ use std::fmt;
 
 use serde::de::{DeserializeSeed, Deserializer, MapAccess, SeqAccess, Visitor};
 
-use crate::import::is_calendar_time;
+use super::time::calendar_time;
 
 /// Units as they stand alone in a cell, or behind a number.
 pub(crate) const UNITS: [&str; 31] = [
@@ -65,7 +65,7 @@ impl Line {
         let cells = rest.split(|c: char| c.is_whitespace() || ",;|{}[]\"()>".contains(c));
         for cell in cells {
             // A time of day has colons too.
-            let clock = is_calendar_time(cell.as_bytes());
+            let clock = is_calendar_time(cell);
             let words: Vec<&str> = match clock {
                 true => vec![cell],
                 false => cell.split([':', '=']).collect(),
@@ -286,8 +286,7 @@ impl<'de> Visitor<'de> for Json<'_> {
     }
 
     fn visit_str<E>(self, text: &str) -> Result<(), E> {
-        if is_calendar_time(text.as_bytes()) || number(text).is_some_and(|(_, unit)| unit.is_none())
-        {
+        if is_calendar_time(text) || number(text).is_some_and(|(_, unit)| unit.is_none()) {
             self.push(text.to_owned());
         }
         Ok(())
@@ -300,6 +299,10 @@ impl<'de> Visitor<'de> for Json<'_> {
     fn visit_unit<E>(self) -> Result<(), E> {
         Ok(())
     }
+}
+
+fn is_calendar_time(text: &str) -> bool {
+    calendar_time(text.as_bytes()).is_some()
 }
 
 /// The line without the colours of a terminal.
@@ -315,7 +318,7 @@ fn without_colours(text: &str) -> String {
 fn prefix(text: &str) -> (Option<(&'static str, String)>, Option<&str>, &str) {
     let bracketed = || text.strip_prefix('[')?.split_once(']');
     if let Some((clock, rest)) = text.split_once(" -> ").or_else(bracketed)
-        && is_calendar_time(clock.as_bytes())
+        && is_calendar_time(clock)
     {
         return (
             Some(("time", clock.trim().to_owned())),
@@ -327,7 +330,7 @@ fn prefix(text: &str) -> (Option<(&'static str, String)>, Option<&str>, &str) {
         let (level, rest) = text.split_once(" (")?;
         let (clock, rest) = rest.split_once(") ")?;
         let (tag, rest) = rest.split_once(": ")?;
-        let name = match is_calendar_time(clock.as_bytes()) {
+        let name = match is_calendar_time(clock) {
             true => "time",
             false => clock.parse::<u64>().ok().map(|_| TIME_MS)?,
         };
