@@ -107,10 +107,8 @@ fn panel(result: &AllanResult, sensor: Sensor, channels: &[&ChannelResult]) -> M
     }
     if models(channels).next().is_some() {
         key.push(("model".into(), "models".into()));
-        key.push((
-            MARK.into(),
-            "coefficients: N at 1 s, K at 3 s, B at the floor".into(),
-        ));
+        key.push((MARK.into(), "N at 1 s, K at 3 s, B at its floor".into()));
+        key.push((UNITS.into(), units(channels)));
     }
     if channels.iter().any(|c| !c.lines.is_empty()) {
         key.push((WEDGE.into(), "lines of the spectrum".into()));
@@ -135,12 +133,16 @@ fn panel(result: &AllanResult, sensor: Sensor, channels: &[&ChannelResult]) -> M
 /// Entries of the legend that are no lines.
 const MARK: &str = "mark";
 const WEDGE: &str = "wedge";
+const UNITS: &str = "units";
 
-/// Name of a channel with its coefficients.
+/// Terms that the picture marks.
+const MARKED: [Term; 3] = [Term::N, Term::B, Term::K];
+
+/// Name of a channel with its coefficients in [`units`].
 fn with_values(channel: &ChannelResult) -> String {
-    let each = [Term::N, Term::B, Term::K].into_iter().filter_map(|term| {
+    let each = MARKED.into_iter().filter_map(|term| {
         let own = channel.get(term).ok()?;
-        let value = readable::noise(&own.unit)[0].write(own.value);
+        let value = significant(own.value * readable::noise(&own.unit)[0].factor);
         Some(format!("{} {value}", term.letter()))
     });
     let each: Vec<String> = each.collect();
@@ -148,6 +150,19 @@ fn with_values(channel: &ChannelResult) -> String {
         true => channel.name.into(),
         false => format!("{}: {}", channel.name, each.join(", ")),
     }
+}
+
+/// Units of the coefficients of `channels`.
+fn units(channels: &[&ChannelResult]) -> String {
+    let each = MARKED.into_iter().filter_map(|term| {
+        let own = channels.iter().find_map(|c| c.get(term).ok())?;
+        Some(format!(
+            "{} in {}",
+            term.letter(),
+            readable::noise(&own.unit)[0].unit
+        ))
+    });
+    each.collect::<Vec<_>>().join(", ")
 }
 
 /// A wedge whose tip is at a place, pixels.
@@ -229,14 +244,14 @@ fn marks(frame: &Frame, channels: &[&ChannelResult], term: Term, by: f64) -> Mar
     }
 }
 
-/// The legend is at the lower left, where falling curves leave space.
+/// The legend is at the upper right, where falling curves leave space.
 fn legend(frame: &Frame, key: &[(String, String)]) -> Markup {
     let letters = key.iter().map(|(_, name)| name.chars().count()).max();
     let (width, height) = (
         46.0 + 7.6 * letters.unwrap_or(0) as f64,
         10.0 + 18.0 * key.len() as f64,
     );
-    let (left, top) = (frame.across.start + 6.0, frame.down.end - 6.0 - height);
+    let (left, top) = (frame.across.end - 6.0 - width, frame.down.start + 6.0);
     html! {
         rect class="key" x=(px(left)) y=(px(top)) width=(px(width)) height=(px(height)) {}
         @for (row, (class, name)) in key.iter().enumerate() {
@@ -244,6 +259,7 @@ fn legend(frame: &Frame, key: &[(String, String)]) -> Markup {
             @match class.as_str() {
                 MARK => circle class="line" cx=(px(left + 20.0)) cy=(px(y)) r="4" {},
                 WEDGE => (wedge(left + 20.0, y + 4.0)),
+                UNITS => {},
                 _ => path class=(class) d={ "M" (px(left + 8.0)) " " (px(y)) "h24" } {},
             }
             text x=(px(left + 38.0)) y=(px(y + 5.0)) { (name) }

@@ -129,13 +129,11 @@ const WINDOW: usize = 256;
 
 /// The share of the samples that are one of the two commonest values of their window, on average.
 fn share_of_two_codes(values: &[f64]) -> f64 {
-    let all = values.len() / WINDOW;
-    let windows = values
-        .chunks_exact(WINDOW)
-        .step_by(all.div_ceil(WINDOWS).max(1));
+    let (all, _) = values.as_chunks::<WINDOW>();
+    let windows = all.iter().step_by(all.len().div_ceil(WINDOWS).max(1));
     let (mut sum, mut count) = (0.0, 0.0);
     for window in windows {
-        let mut sorted = window.to_vec();
+        let mut sorted = *window;
         sorted.sort_by(f64::total_cmp);
         let mut runs: Vec<usize> = sorted.chunk_by(|a, b| a == b).map(<[f64]>::len).collect();
         runs.sort_unstable_by(|a, b| b.cmp(a));
