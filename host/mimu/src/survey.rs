@@ -4,6 +4,7 @@
 //! curves. The next channel is read while the curves are computed.
 
 mod ahead;
+mod bridging;
 mod columns;
 mod judged;
 mod masking;

@@ -8,6 +8,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Matrix3};
 use super::closure::{Closure, SHARES, scales};
 use super::component::{Component, Kind};
 use super::rests::EARTH;
+use super::smoothed::{Smoothed, SmoothedState};
 use super::state::{CLOCK, G_SENSITIVITY, GRAVITY, LEVER, MOUNTING, STATES, offset};
 use crate::quantity::{PerSensor, Sensor};
 use crate::readable::STANDARD_GRAVITY;
@@ -56,40 +57,6 @@ struct Updated<'a> {
     log_det: f64,
     x: &'a DVector<f64>,
     p: &'a DMatrix<f64>,
-}
-
-/// The state by all segments, at the time of each.
-#[derive(Debug, Clone)]
-pub(super) struct Smoothed {
-    /// In order of time.
-    pub each: Vec<SmoothedState>,
-}
-
-/// The state at an instant.
-#[derive(Debug, Clone)]
-pub(super) struct SmoothedState {
-    pub at_s: f64,
-    value: DVector<f64>,
-    sigma: DVector<f64>,
-}
-
-impl SmoothedState {
-    /// Element `state`; 0 if the model lacks it.
-    pub fn value(&self, state: usize) -> f64 {
-        self.value[state]
-    }
-
-    /// Its standard deviation; 0 if the model lacks it.
-    pub fn sigma(&self, state: usize) -> f64 {
-        self.sigma[state]
-    }
-}
-
-impl Smoothed {
-    /// The state in the middle of the session.
-    pub fn middle(&self) -> &SmoothedState {
-        &self.each[self.each.len() / 2]
-    }
 }
 
 /// The state that a model uses, and its covariance at the beginning.

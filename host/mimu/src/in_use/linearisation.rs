@@ -3,7 +3,7 @@
 
 use nalgebra::{DVector, Vector3};
 
-use super::likelihood::Smoothed;
+use super::smoothed::Smoothed;
 use super::state::{CLOCK, MOUNTING, STATES, offset};
 use crate::quantity::{PerSensor, Sensor};
 

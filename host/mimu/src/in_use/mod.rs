@@ -6,7 +6,7 @@
 //! | `rests`, `trajectory`, `trajectory_file`, `closure` | the errors against a reference: rests before and after, or a trajectory |
 //! | `linearisation`, `mounted` | the point about which the errors are linear, and the estimates there |
 //! | `allan_noise`, `component` | what is known of the noise, and the variances that the errors may have beyond it |
-//! | `likelihood`, `search` | a filter over the segments, and the most likely variances |
+//! | `likelihood`, `smoothed`, `search` | a filter over the segments, its estimates, and the most likely variances |
 //! | `attribution`, `judged` | causes, and the errors of segments that were held out |
 
 mod allan_noise;
@@ -21,6 +21,7 @@ mod mounted;
 mod noise_file;
 mod rests;
 mod search;
+mod smoothed;
 mod state;
 mod trajectory;
 mod trajectory_file;
@@ -43,13 +44,14 @@ use crate::warning::Warning;
 use allan_noise::AllanNoise;
 use closure::Closure;
 use component::{FILTER, REFERENCE_COUNT};
-use likelihood::{Model, Session, Smoothed};
+use likelihood::{Model, Session};
 use linearisation::Linearisation;
 use mimu_allan::model::Term;
 use mimu_recording::Recording;
 use mimu_recording::error::{Error, Result};
 pub use mounted::{Estimate, Mounted};
 use search::{Fitted, Search};
+use smoothed::Smoothed;
 
 /// Fewer segments show no variance.
 const FEWEST_SEGMENTS: usize = 6;

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::likelihood::{Smoothed, SmoothedState};
+use super::smoothed::{Smoothed, SmoothedState};
 use super::state::{CLOCK, LEVER, MOUNTING, offset};
 use crate::quantity::PerSensor;
 

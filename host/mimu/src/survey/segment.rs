@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
+use super::bridging::{MOST, bridges};
 use super::columns::Columns;
-use super::masking::{MOST, bridges};
 use crate::quantity::plural;
 use crate::signal::blocks::extent;
 use crate::warning::Warning;

@@ -1,6 +1,7 @@
 //! The samples of a channel for the computation: a segment without a gap, checked, with short disturbances masked.
 
-use super::masking::{Masked, bridge, bridges, mask};
+use super::bridging::{bridge, bridges};
+use super::masking::{Masked, mask};
 use super::segment::{FEWEST, Part, Segment, longest};
 use super::suitability::{Suitability, suitability};
 use crate::survey::unit::Unit;
