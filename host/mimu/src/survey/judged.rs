@@ -90,7 +90,11 @@ fn of_channel(channel: &Channel) -> Option<Judgement> {
     Some(Judgement::new(JudgementKind::Untested, reason))
 }
 
-/// The judgement of the random walk that exports get, of the worst axis, if that is a bound.
+/// Time, s, from which on a walk may exceed the white noise for its bound to do no harm in a filter: those of MEMS gyros do so after minutes. Ten seconds at rest give a
+/// bound that does so after five, 30 times what an hour shows; three minutes one that does so after one.
+const HARMLESS_S: f64 = 30.0;
+
+/// The judgement of the random walk that exports get, of the worst axis, if that is a bound, and a loose one.
 fn of_bound(sensor: Sensor, channels: &[&Channel]) -> Option<Judgement> {
     let seen = |c: &Channel| Some(c.model.as_ref()?.get(Term::K).ok()?.value);
     let largest = channels.iter().filter_map(|c| seen(c)).fold(0.0, f64::max);
@@ -103,5 +107,8 @@ fn of_bound(sensor: Sensor, channels: &[&Channel]) -> Option<Judgement> {
         significant(bound),
         channel.unit.coefficient(Term::K)
     );
-    (bound > largest).then(|| Judgement::new(JudgementKind::Untested, reason))
+    let white = channel.model.as_ref()?.get(Term::N).ok()?.value;
+    let exceeds_s = 3f64.sqrt() * white / bound;
+    (bound > largest && exceeds_s < HARMLESS_S)
+        .then(|| Judgement::new(JudgementKind::Untested, reason))
 }
