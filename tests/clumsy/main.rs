@@ -127,7 +127,7 @@ fn main() -> ExitCode {
 /// The clock of a seed's board is fast or slow by 0.5 to 4.5 %.
 fn wrong_clock(board: &mut TextBoard, seed: u64) {
     let share = 0.005 + 0.04 * Random::new(seed ^ 0xc10c).even();
-    let factor = if seed % 2 == 0 {
+    let factor = if seed.is_multiple_of(2) {
         1.0 + share
     } else {
         1.0 - share

@@ -47,7 +47,7 @@ mod tests {
 
     #[test]
     fn a_gap_in_a_ramp_is_bridged_by_its_ramp_and_the_noise_before_it() {
-        let noise = |k: usize| if k % 2 == 0 { 1.0 } else { -1.0 };
+        let noise = |k: usize| if k.is_multiple_of(2) { 1.0 } else { -1.0 };
         let all: Vec<f64> = (0..40).map(|k| 0.5 * k as f64 + noise(k)).collect();
         let kept: Vec<f64> = [&all[..20], &all[24..]].concat();
         let whole = bridge(&kept, &[(20, 4)]);
