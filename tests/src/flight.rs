@@ -37,7 +37,7 @@ pub struct Flight {
     pub reference: [f64; 2],
     /// White noise of both sensors in motion over that at rest.
     pub white: [f64; 2],
-    /// Whether it rests for half of each [`CYCLE_S`].
+    /// Whether it rests for half of each `CYCLE_S`.
     pub rests: bool,
 }
 
