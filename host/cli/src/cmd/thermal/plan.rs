@@ -64,7 +64,7 @@ pub(super) struct PlanArgs {
 
 #[derive(Clone, Copy, ValueEnum)]
 enum ProcedureArg {
-    /// Set points; the unit soaks at each before it is measured (fang, 3)
+    /// Set points; the unit soaks at each before it is measured (fang, 4.4)
     Soak,
     /// Positions and quarter turns on a ramp up and down (niu, 3.2)
     Niu,
