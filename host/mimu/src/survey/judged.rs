@@ -91,8 +91,8 @@ fn of_channel(channel: &Channel) -> Option<Judgement> {
 }
 
 /// Time, s, from which on a walk may exceed the white noise for its bound to do no harm in a filter: those of MEMS gyros do so after minutes. Ten seconds at rest give a
-/// bound that does so after five, 30 times what an hour shows; three minutes one that does so after one.
-const HARMLESS_S: f64 = 30.0;
+/// bound that does so after one, three minutes after 24, an hour after eight minutes.
+const HARMLESS_S: f64 = 10.0;
 
 /// The judgement of the random walk that exports get, of the worst axis, if that is a bound, and a loose one.
 fn of_bound(sensor: Sensor, channels: &[&Channel]) -> Option<Judgement> {

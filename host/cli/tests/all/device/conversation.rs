@@ -74,11 +74,11 @@ fn a_calibration_arrives_whole_over_a_line_that_loses_and_garbles() {
         c[(0, 1)] as f32
     );
 
-    // Nothing is written twice.
+    // Sent again: only the device knows whether what lies beside it in the flash is whole.
     let commits = peer.count("UploadCommit");
     let again = mimu(&place, &upload).json();
     assert_eq!(again["was_there"], true);
-    assert_eq!(peer.count("UploadCommit"), commits);
+    assert!(peer.count("UploadCommit") > commits);
 }
 
 #[test]
