@@ -531,7 +531,7 @@ fn six_faces_give_scale_factors_and_biases_and_the_angles_of_data_sheets() {
         let accel = fitted.sensor(Sensor::Accel).expect("an accelerometer");
         let found = accel.estimated.triad.physical(mimu::triad::Angles::Exact);
         let angle = found.non_orthogonality[0].interval;
-        assert!((angle / 0.0196 - 1.0).abs() < 0.3, "{angle}");
+        assert!((angle / 0.032 - 1.0).abs() < 0.3, "{angle}");
         let open = found.scale[0].interval / found.scale[0].value;
         assert!(open < 4e-3, "{open}");
         held += session.inside(&fitted)[0];
