@@ -3,7 +3,6 @@
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
-use crate::manifest::Manifest;
 
 /// Difference that is reported. Crystals keep 0.01 %, ceramic resonators 0.5 %; an oscillator on the chip keeps 1 to 2 %.
 pub const REPORTED_SHARE: f64 = 0.005;
@@ -85,20 +84,5 @@ impl ClockRate {
             problem,
             "write how many seconds the board's clock advances in one second, or remove the table",
         ))
-    }
-}
-
-impl Manifest {
-    /// Converts its times and its rate from the board's clock to the computer's. Returns the ratio by which `t_s` has to be divided, if they are not the
-    /// same.
-    pub fn by_computer(&mut self) -> Option<f64> {
-        let clock = self.clock.as_mut().filter(|c| c.times == Times::Board)?;
-        clock.times = Times::Computer;
-        let factor = clock.factor;
-        self.sample_rate_hz *= factor;
-        let restarts = self.recorded.iter_mut().flat_map(|r| &mut r.restarts);
-        let times = restarts.map(|restart| &mut restart.t_s);
-        times.chain(&mut self.power_on_s).for_each(|t| *t /= factor);
-        Some(factor)
     }
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::clock::ClockRate;
+use super::clock::{ClockRate, Times};
 use super::recorded::{Recorded, SensorSettings};
 use super::reference_error::ReferenceError;
 use super::turntable::Turntable;
@@ -261,6 +261,19 @@ fn is_unknown(number: &f64) -> bool {
 }
 
 impl Manifest {
+    /// Converts its times and its rate from the board's clock to the computer's. Returns the ratio by which `t_s` has to be divided, if they are not the
+    /// same.
+    pub fn by_computer(&mut self) -> Option<f64> {
+        let clock = self.clock.as_mut().filter(|c| c.times == Times::Board)?;
+        clock.times = Times::Computer;
+        let factor = clock.factor;
+        self.sample_rate_hz *= factor;
+        let restarts = self.recorded.iter_mut().flat_map(|r| &mut r.restarts);
+        let times = restarts.map(|restart| &mut restart.t_s);
+        times.chain(&mut self.power_on_s).for_each(|t| *t /= factor);
+        Some(factor)
+    }
+
     /// Why the device had started, if it was not by a power-on and `power_on_s` is not given. The time since power-on is then unknown: it did not
     /// begin at the first sample.
     pub fn start_without_power_on(&self) -> Option<&str> {

@@ -27,7 +27,10 @@ fn readings_whose_low_byte_was_taken_for_a_signed_number_are_refused_by_their_ch
         assert_eq!(file.effect.len(), 1);
         let recorded = bench::recorded(&bench::hand_plan(20), &file, 3);
         let error = fit(recorded, Options::IN_SAMPLE).expect_err(kept);
-        assert_eq!(error.refused().arguments, [Argument::SignedLowByte]);
+        assert_eq!(
+            error.refused().arguments,
+            [Argument::SignedLowByte, Argument::TrustReadings]
+        );
         let refused = error.to_string();
         assert!(
             refused.contains(named) && refused.contains("low byte") && !refused.contains(sound),
