@@ -90,8 +90,8 @@ fn of_channel(channel: &Channel) -> Option<Judgement> {
     Some(Judgement::new(JudgementKind::Untested, reason))
 }
 
-/// Time, s, from which on a walk may exceed the white noise for its bound to do no harm in a filter: those of MEMS gyros do so after minutes. Ten seconds at rest give a
-/// bound that does so after one, three minutes after 24, an hour after eight minutes.
+/// Time, s, from which on a walk may exceed the white noise for its bound to do no harm in a filter: those of MEMS gyros do so after 20 s and more. The bound of a record does so
+/// after about a fortieth of its length.
 const HARMLESS_S: f64 = 10.0;
 
 /// The judgement of the random walk that exports get, of the worst axis, if that is a bound, and a loose one.
