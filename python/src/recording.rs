@@ -244,7 +244,7 @@ fn column<'py>(
     }
 }
 
-/// A table whose three columns differ in x, y and z alone, in the order x, y, z; everything else as it is.
+/// A table whose three columns differ in x, y and z alone, in the order x, y, z; everything else unchanged.
 pub(crate) fn ordered<'py>(value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
     let names = match value.getattr_opt("columns")? {
         Some(columns) => columns.try_iter()?.collect::<PyResult<Vec<_>>>()?,

@@ -84,12 +84,7 @@ fn analysed(
     let contradicting = contradicting(all, &triads);
     let levels = all_levels(all);
     let is_stranger = of_strangers(all, &strangers);
-    // Further measurements of a unit are no further units.
-    let mut is_further = vec![false; all.len()];
-    units
-        .iter()
-        .flat_map(|u| &u[1..])
-        .for_each(|m| is_further[*m] = true);
+    let is_further = repeated(&units, all.len());
     let different = different(&triads, &levels, &is_stranger, &is_further);
     let is_left_out: Vec<bool> = is_stranger
         .iter()
@@ -116,8 +111,6 @@ fn analysed(
         })
     });
     let changed_units = changed_units.collect();
-    let mut days: Vec<_> = all.iter().filter_map(|m| m.day).collect();
-    days.sort_unstable();
     let mut result = Fleet {
         format: "mimu-fleet/1",
         tool: format!("mimu {}", env!("CARGO_PKG_VERSION")),
@@ -132,10 +125,7 @@ fn analysed(
             .iter()
             .map(|(name, of)| (name.clone(), of.len()))
             .collect(),
-        days: days
-            .first()
-            .zip(days.last())
-            .map(|(a, b)| [a.to_string(), b.to_string()]),
+        days: first_and_last_day(all),
         sensors: mimu::PerSensor::default(),
         strangers,
         contradicting,
@@ -154,6 +144,20 @@ fn analysed(
     result.left_out = tree.left_out;
     result.judgement = judge(&result);
     Ok((result, triads, (raw_unit, reference)))
+}
+
+/// Whether each of `count` measurements repeats an earlier one of its unit: it does not count as another unit.
+fn repeated(units: &[Vec<usize>], count: usize) -> Vec<bool> {
+    let mut repeated = vec![false; count];
+    let all = units.iter().flat_map(|u| &u[1..]);
+    all.for_each(|m| repeated[*m] = true);
+    repeated
+}
+
+/// The first and the last day of measurements; `None` if no measurement has a day.
+fn first_and_last_day(all: &[Measurement]) -> Option<[String; 2]> {
+    let days = || all.iter().filter_map(|m| m.day);
+    Some([days().min()?, days().max()?].map(|day| day.to_string()))
 }
 
 /// The units, with the first measurement only of those that change: a unit that ages shows neither how well measurements repeat nor what a unit of the kind is.

@@ -76,7 +76,7 @@ impl ClockRate {
             return Ok(());
         }
         let problem = format!(
-            "{:?} ± {:?} is no ratio of clocks",
+            "{:?} ± {:?} cannot be a ratio of clocks",
             self.factor, self.half_width
         );
         Err(Error::new(

@@ -328,7 +328,7 @@ impl<'a> Wizard<'a> {
         Some(next_step(&self.config, &had, worst.progress.missed()))
     }
 
-    /// The next dwell of the queue. By hand one that differs from the last pose comes first: the same pose again is no turn.
+    /// The next dwell of the queue. By hand one that differs from the last pose comes first, so that a turn leads to it.
     fn queued(&mut self) -> Option<Step> {
         let last = self.units.first().and_then(|u| u.folder.last_dwell());
         let last = last.filter(|_| self.config.fixture != Fixture::Table);

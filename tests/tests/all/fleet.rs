@@ -178,7 +178,7 @@ fn the_commands_write_a_prior_and_fit_with_it() {
         "{}",
         found["left_out"]
     );
-    // Without the prior six faces give scale factors and biases, and a calibration is no prior.
+    // Without the prior six faces give scale factors and biases. A calibration is refused as a prior.
     assert_eq!(run(&[o("fit"), recording.as_os_str()]), 0);
     let other = cals.join("batch=0/u02.toml");
     assert_eq!(

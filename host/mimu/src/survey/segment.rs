@@ -87,14 +87,10 @@ impl Segment {
         let rate_hz = manifest.sample_rate_hz;
         let at = |i: usize| format!("{place}, data row {}, t_s", first + i + 1);
         if t.len() < FEWEST {
-            return Err(Error::new(
-                place,
-                format!(
-                    "{}, and at least {FEWEST} are needed to compute noise",
-                    plural(t.len() as u64, "sample")
-                ),
-                "record for longer, or choose a longer segment",
-            ));
+            let had = plural(t.len() as u64, "sample");
+            let problem = format!("{had}, and at least {FEWEST} are needed to compute noise");
+            let remedy = "record for longer, or choose a longer segment";
+            return Err(Error::new(place, problem, remedy));
         }
         let (mut gaps, mut first_gap, mut regular_s) = (0usize, None, 0.0);
         for i in 1..t.len() {
@@ -148,25 +144,23 @@ impl Segment {
         if let Some(i) = first_gap {
             used = bridged(t, period_s);
             let (rows, lost) = &used;
-            let first_s = t[i] - t[i - 1];
-            let gaps = gaps as u64;
             let samples: usize = lost.iter().map(|(_, count)| count).sum();
-            if lost.len() as u64 == gaps {
-                let share = samples as f64 / (rows.len() + samples) as f64;
-                warnings.push(Warning::Bridged {
+            let whole = (rows.len() + samples) as f64;
+            let (bridged, gaps) = (lost.len() == gaps, gaps as u64);
+            warnings.push(match bridged {
+                true => Warning::Bridged {
                     gaps,
                     samples,
-                    share,
-                });
-            } else {
-                warnings.push(Warning::LongestStretch {
+                    share: samples as f64 / whole,
+                },
+                false => Warning::LongestStretch {
                     gaps,
-                    first_s,
+                    first_s: t[i] - t[i - 1],
                     row: first + i + 1,
-                    length_s: (rows.len() + samples) as f64 * period_s,
+                    length_s: whole * period_s,
                     from_s: t[rows.start],
-                });
-            }
+                },
+            });
             if rows.len() < FEWEST {
                 return Err(Error::new(
                     at(i),

@@ -112,7 +112,7 @@ struct Cell {
     conversion: Conversion,
 }
 
-/// Pause that stands for the unknown one of a logger that started again, if its rows have no times, s.
+/// Assumed pause of a logger that started again, if its rows have no times, s.
 const PAUSE_S: f64 = 1.0;
 
 /// Where the time of a row comes from.

@@ -97,7 +97,7 @@ impl UnitSession {
         };
         let had = self.folder.dwells(self.part);
         let near = |d: &Step| off(d) < SAME_POSE_DEG;
-        // The same pose twice in a row is no turn, also across parts, unless the unit was turned away in between. An earlier pose may be requested again.
+        // Between equal poses there is a turn only if the unit was turned away in between, also across parts. An earlier pose may be requested again.
         let same = by_hand
             && !self.away
             && self

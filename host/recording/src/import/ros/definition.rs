@@ -21,7 +21,7 @@ enum Field {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Before {
     fields: Vec<Field>,
-    /// Whether the message begins with a header of its own.
+    /// Whether the message begins with its own header.
     pub header: bool,
 }
 
