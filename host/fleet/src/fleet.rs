@@ -361,41 +361,46 @@ fn different(
     let mut found: Vec<DifferentLevel> = Vec::new();
     for triad in triads {
         let has: Vec<bool> = triad.estimates.iter().map(Option::is_some).collect();
-        let empty = mimu::nalgebra::DVector::zeros(triad.n());
-        let values = triad
-            .estimates
-            .iter()
-            .map(|e| e.as_ref().map_or(&empty, |e| &e.values));
-        let units = Units {
-            values: values.collect(),
+        let values = triad.estimates.iter();
+        let mut units = Units {
+            values: values.map(|e| Some(e.as_ref()?.values.clone())).collect(),
             covariance: triad.of_one(),
         };
-        for (label, levels) in labels {
-            let with = |members: &[usize]| -> Vec<usize> {
-                members
-                    .iter()
-                    .copied()
-                    .filter(|m| has[*m] && !is_further[*m])
-                    .collect()
+        let with = |members: &Vec<usize>| -> Vec<usize> {
+            let of_unit = members.iter().copied();
+            of_unit.filter(|m| has[*m] && !is_further[*m]).collect()
+        };
+        let own = labels.iter().map(|(label, levels)| {
+            let levels = levels.iter().map(|(name, m)| (name.clone(), with(m)));
+            (label, levels.collect::<Levels>())
+        });
+        let own: Vec<(&String, Levels)> = own.collect();
+        let mut named: Vec<(&String, String)> = Vec::new();
+        loop {
+            let each = own.iter().filter_map(|(label, levels)| {
+                Some((*label, levels, levels::different(&units, levels, tried)?))
+            });
+            let most = each.min_by(|a, b| a.2.p.total_cmp(&b.2.p));
+            let Some((label, levels, one)) =
+                most.filter(|(label, _, one)| !named.contains(&(*label, one.level.clone())))
+            else {
+                break;
             };
-            let own: Levels = levels
-                .iter()
-                .map(|(name, m)| (name.clone(), with(m)))
-                .collect();
-            for one in levels::different(&units, &own, tried) {
-                found.push(DifferentLevel {
-                    label: label.clone(),
-                    strangers: own[&one.level].iter().filter(|m| is_stranger[**m]).count(),
-                    count: one.count,
-                    sensor: triad.basis.sensor,
-                    p: (one.p * tried as f64).min(1.0),
-                    parameter: triad.basis.parameter(one.most).to_string(),
-                    parameter_unit: triad.basis.unit(one.most),
-                    change: one.change,
-                    sigmas: one.sigmas,
-                    level: one.level,
-                });
-            }
+            let members = &levels[&one.level];
+            units.without(&one, members);
+            named.push((label, one.level.clone()));
+            found.push(DifferentLevel {
+                label: label.clone(),
+                strangers: members.iter().filter(|m| is_stranger[**m]).count(),
+                count: one.count,
+                sensor: triad.basis.sensor,
+                p: (one.p * tried as f64).min(1.0),
+                parameter: triad.basis.parameter(one.most).to_string(),
+                parameter_unit: triad.basis.unit(one.most),
+                change: one.change,
+                sigmas: one.sigmas,
+                level: one.level,
+            });
         }
     }
     found.sort_by(|a, b| {

@@ -20,9 +20,9 @@ pub const FEWEST: usize = 3;
 pub const RELEVANT: f64 = 0.3;
 
 /// Parameters of units, to be compared by their labels.
-pub struct Units<'a> {
-    /// Parameters of each measurement.
-    pub values: Vec<&'a DVector<f64>>,
+pub struct Units {
+    /// Parameters of each measurement; `None` where a triad was not measured.
+    pub values: Vec<Option<DVector<f64>>>,
     /// Covariance of one measurement about the population's mean.
     pub covariance: DMatrix<f64>,
 }
@@ -42,17 +42,46 @@ pub struct Different {
     pub change: f64,
     /// The same in standard deviations of the population.
     pub sigmas: f64,
+    /// The change of all parameters.
+    all: DVector<f64>,
 }
 
 /// Levels of a label, with the numbers of their measurements.
 pub type Levels = std::collections::BTreeMap<String, Vec<usize>>;
 
-/// The levels that differ from the others; `tried` is the number of all comparisons.
-pub fn different(units: &Units, levels: &Levels, tried: usize) -> Vec<Different> {
+impl Units {
+    /// Removes what a level, with these `members`, differs by. The other labels are then judged without it: a batch that differs widens the scatter of the units of each
+    /// fixture, and hides a fixture that differs too.
+    pub fn without(&mut self, one: &Different, members: &[usize]) {
+        let before = self.scales();
+        for m in members {
+            if let Some(value) = &mut self.values[*m] {
+                *value -= &one.all;
+            }
+        }
+        let narrower = self
+            .scales()
+            .component_div(&before)
+            .map(|ratio| ratio.min(1.0));
+        let by = DMatrix::from_diagonal(&narrower);
+        self.covariance = &by * &self.covariance * &by;
+    }
+
+    /// Robust standard deviations of the parameters.
+    fn scales(&self) -> DVector<f64> {
+        DVector::from_fn(self.covariance.nrows(), |i, _| {
+            let measured = self.values.iter().flatten().map(|v| v[i]);
+            robust::location_and_scale(measured).1
+        })
+    }
+}
+
+/// The level that differs most certainly from the others; `tried` is the number of all comparisons.
+pub fn different(units: &Units, levels: &Levels, tried: usize) -> Option<Different> {
     let usable: Vec<(&String, &Vec<usize>)> =
         levels.iter().filter(|(_, m)| m.len() >= FEWEST).collect();
     if usable.len() < 2 {
-        return Vec::new();
+        return None;
     }
     let medians: Vec<Estimates> = usable.iter().map(|(_, m)| median(units, m)).collect();
     let judged = match usable.len() >= MANY {
@@ -72,13 +101,11 @@ pub fn different(units: &Units, levels: &Levels, tried: usize) -> Vec<Different>
             most,
             change: change[most],
             sigmas: change[most] / sigma(most),
+            all: change,
         })
     });
-    let mut found: Vec<Different> = each
-        .filter(|d| d.p * (tried as f64) < FALSE_FINDING && d.sigmas.abs() > RELEVANT)
-        .collect();
-    found.sort_by(|a, b| a.p.total_cmp(&b.p));
-    found
+    each.filter(|d| d.p * (tried as f64) < FALSE_FINDING && d.sigmas.abs() > RELEVANT)
+        .min_by(|a, b| a.p.total_cmp(&b.p))
 }
 
 /// Medians of the parameters of some measurements, and their covariance: that of the medians of a normal distribution is `asin(ρ) σ σ / n`.
@@ -86,7 +113,8 @@ fn median(units: &Units, members: &[usize]) -> Estimates {
     let n = units.covariance.nrows();
     let count = members.len() as f64;
     let values = DVector::from_fn(n, |i, _| {
-        let mut all: Vec<f64> = members.iter().map(|m| units.values[*m][i]).collect();
+        let measured = members.iter().filter_map(|m| units.values[*m].as_ref());
+        let mut all: Vec<f64> = measured.map(|v| v[i]).collect();
         robust::median(&mut all)
     });
     let c = &units.covariance;
@@ -155,4 +183,64 @@ fn against<'a>(
     );
     let p = ChiSquared::new(n as f64).map_or(1.0, |d| d.sf(square));
     Some((p, change.component_mul(&unit)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mimu_rig::random::Random;
+
+    /// Labels that differ among 96 units of two parameters: half of them are of batch 2, off by `batch` in both; of the four fixtures D is off by `fixture` in the first,
+    /// and has batch 1 three times as often as batch 2.
+    fn named(seed: u64, batch: f64, fixture: f64) -> Vec<String> {
+        let mut random = Random::new(seed, "levels");
+        let mut levels = [Levels::new(), Levels::new()];
+        let mut values = Vec::new();
+        for k in 0..96 {
+            let of_d = k % 4 == 3;
+            let second = if of_d { k % 16 == 3 } else { k % 8 > 2 };
+            let own = DVector::from_fn(2, |i, _| {
+                let by_batch = if second { batch } else { 0.0 };
+                let by_fixture = if of_d && i == 0 { fixture } else { 0.0 };
+                random.normal() + by_batch + by_fixture
+            });
+            values.push(Some(own));
+            let names = [["1", "2"][usize::from(second)], ["A", "B", "C", "D"][k % 4]];
+            for (levels, name) in levels.iter_mut().zip(names) {
+                levels.entry(name.into()).or_default().push(k);
+            }
+        }
+        let all: Vec<DVector<f64>> = values.iter().flatten().cloned().collect();
+        let (_, covariance) = robust::first(&all, None, true);
+        let mut units = Units { values, covariance };
+        let mut named = Vec::new();
+        loop {
+            let each = levels.iter().enumerate();
+            let each = each.filter_map(|(l, levels)| Some((l, different(&units, levels, 6)?)));
+            let Some((l, one)) = each.min_by(|a, b| a.1.p.total_cmp(&b.1.p)) else {
+                return named;
+            };
+            units.without(&one, &levels[l][&one.level]);
+            named.push(one.level);
+            assert!(named.len() < 10, "{named:?}");
+        }
+    }
+
+    #[test]
+    fn a_fixture_that_differs_is_found_beside_a_batch_that_differs_more() {
+        let found = |batch, fixture| -> [usize; 2] {
+            let all: Vec<Vec<String>> = (0..40).map(|s| named(s, batch, fixture)).collect();
+            let of = |level: &str| all.iter().filter(|n| n.iter().any(|l| l == level)).count();
+            [
+                of("D"),
+                all.iter()
+                    .filter(|n| n.iter().any(|l| ["A", "B", "C"].contains(&&l[..])))
+                    .count(),
+            ]
+        };
+        let (alone, beside, none) = (found(0.0, 1.5), found(4.0, 1.5), found(4.0, 0.0));
+        println!("alone {alone:?}, beside {beside:?}, none {none:?}");
+        assert!(beside[0] + 4 >= alone[0], "{beside:?} {alone:?}");
+        assert!(none[0] + none[1] <= 2, "{none:?}");
+    }
 }
