@@ -4,10 +4,15 @@
 //! `clumsy population PART UNITS SESSIONS [FOLDER]`: sessions of so many units of a part make its population (`mimu fleet --prior`), and as many further units as
 //! SESSIONS are calibrated with it and without it.
 //!
-//! `clumsy drift SESSIONS [FIRST [FOLDER]]`: the gyro of every board drifts by 0.3 deg/s a minute. A session is wrong if it stores a misfit without a question, which
-//! these people decline, or a calibration that is judged good.
+//! `clumsy TROUBLE SESSIONS [FIRST [FOLDER]]`: every session has one of these besides.
 //!
-//! `clumsy clock SESSIONS [FIRST [FOLDER]]`: the clock of every board errs by 0.5 to 4.5 %.
+//! | trouble | what |
+//! |---|---|
+//! | drift | the gyro drifts by 0.3 deg/s a minute. A session is wrong if it stores a misfit without a question, which these people decline, or a calibration that is judged good |
+//! | clock | the board's clock errs by 0.5 to 4.5 % |
+//! | steps | biases differ by 0.1 deg/s and 5 mg after each power-on, and the cable is pulled |
+//! | swap | another unit of the part is at the cable after it was pulled. A session is wrong if it stores a calibration that is judged good |
+//! | kills | the command is killed every two minutes, and started again |
 //!
 //! A session passes if it ends in a calibration that is right. One that ends in another way says why; a wrong calibration is an error of the wizard.
 
@@ -23,22 +28,24 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 
 use mimu::{Calibration, JudgementKind};
 use mimu_cli::called::{Refusal, wizard};
-use mimu_tests::stored_calibration::{errors, half_widths};
+use mimu_tests::stored_calibration::{Truth, errors, half_widths};
 use mimu_tests::text_board::{Random, TextBoard};
 use mimu_wizard::event::{Event, Question, SessionState, UserRequest, View};
 use mimu_wizard::relay::{Arrival, Stamped};
 use mimu_wizard::turn::go_on;
 use rayon::prelude::*;
 
-use person::{Habits, Person};
+use person::{Habits, Person, Trouble};
 use sensors::Sensor;
 
-/// Drift of the boards of `clumsy drift`, rad/s a second: 0.3 deg/s a minute.
+/// Drift of the boards, rad/s a second: 0.3 deg/s a minute.
 const DRIFT: f64 = 0.005 * std::f64::consts::PI / 180.0;
 /// Longest session, s.
 const LONGEST_S: f64 = 3600.0;
-/// How often the person runs the same command again if it was refused.
-const AGAIN: u32 = 2;
+/// How often the person runs the same command again if it was refused, and if it was killed.
+const AGAIN: [u32; 2] = [2, 30];
+/// Mean time until the command is killed, s.
+const KILLED_S: f64 = 120.0;
 /// A parameter that errs by so many halves of its 95 % interval is wrong: that is 5.9 sigma.
 const WRONG: f64 = 3.0;
 
@@ -71,6 +78,8 @@ enum End {
     Not(String),
     /// The session was refused: why. The same command goes on with it.
     Refused(String),
+    /// The command was killed, and goes on with the session.
+    Killed,
     /// It went on for [`LONGEST_S`]: the last reason to wait.
     Stuck(String),
 }
@@ -99,10 +108,15 @@ fn main() -> ExitCode {
         };
         return population::run(part, *units, *sessions, kept.as_deref());
     }
-    let (fault, arguments): (fn(&mut TextBoard, u64), _) = match &arguments[..] {
-        [what, rest @ ..] if what == "drift" => (|board, _| board.drift = DRIFT, rest),
-        [what, rest @ ..] if what == "clock" => (wrong_clock, rest),
-        all => (|_, _| {}, all),
+    let (trouble, arguments) = match &arguments[..] {
+        [what, rest @ ..] if what.parse::<u64>().is_err() => match Trouble::named(what) {
+            Some(trouble) => (Some(trouble), rest),
+            None => {
+                eprintln!("clumsy: {what} is none of drift, clock, steps, swap, kills, population");
+                return ExitCode::FAILURE;
+            }
+        },
+        all => (None, all),
     };
     let kept = arguments.get(2).map(PathBuf::from);
     let numbers: Result<Vec<u64>, _> = arguments.iter().take(2).map(|a| a.parse()).collect();
@@ -115,8 +129,12 @@ fn main() -> ExitCode {
         .into_par_iter()
         .map(|seed| {
             let mut sensor = Sensor::of(seed);
-            fault(&mut sensor.board, seed);
-            let session = session(seed, sensor, kept.as_deref(), "");
+            match trouble {
+                Some(Trouble::Drift) => sensor.board.drift = DRIFT,
+                Some(Trouble::Clock) => wrong_clock(&mut sensor.board, seed),
+                _ => {}
+            }
+            let session = session(seed, sensor, trouble, (kept.as_deref(), ""));
             println!("{}", session.line());
             session
         })
@@ -150,6 +168,7 @@ impl Session {
             ),
             End::Not(why) => format!("not stored: {why}"),
             End::Refused(why) => format!("refused: {why}"),
+            End::Killed => "killed too often".into(),
             End::Stuck(why) => format!("STUCK: {why}"),
         };
         format!(
@@ -164,21 +183,26 @@ impl Session {
     }
 }
 
-/// The units and habits of a seed, and what became of them. `more`: further arguments.
-fn session(seed: u64, sensor: Sensor, kept: Option<&Path>, more: &str) -> Session {
-    let habits = Habits::of(seed);
+/// The units and habits of a seed, and what became of them. `kept` keeps the session; `more`: further arguments.
+fn session(
+    seed: u64,
+    sensor: Sensor,
+    trouble: Option<Trouble>,
+    (kept, more): (Option<&Path>, &str),
+) -> Session {
+    let habits = Habits::of(seed).with(trouble);
     let folder = tempfile::tempdir().expect("a folder");
     let out = match kept {
         Some(kept) => kept.join(seed.to_string()),
         None => folder.path().join("out"),
     };
-    let mut person = Person::new(&habits, seed);
-    let (mut runs, mut end) = (0, End::Refused(String::new()));
-    while runs <= AGAIN {
-        runs += 1;
+    let mut person = Person::new(&habits, seed, trouble);
+    let (mut runs, mut end) = ([0; 2], End::Killed);
+    while runs[0] <= AGAIN[0] && runs[1] <= AGAIN[1] {
         end = run(&sensor, &mut person, &out, more);
         match &end {
-            End::Refused(_) if person.now_s < LONGEST_S => {}
+            End::Refused(_) if person.now_s < LONGEST_S => runs[0] += 1,
+            End::Killed if person.now_s < LONGEST_S => runs[1] += 1,
             _ => break,
         }
     }
@@ -189,7 +213,7 @@ fn session(seed: u64, sensor: Sensor, kept: Option<&Path>, more: &str) -> Sessio
         habits: habits.names(),
         minutes: person.now_s / 60.0,
         dwells: journal.matches("\"entry\":\"dwell\"").count(),
-        runs,
+        runs: runs[0] + runs[1] + 1,
         end,
     }
 }
@@ -226,6 +250,9 @@ fn run(sensor: &Sensor, person: &mut Person, out: &Path, more: &str) -> End {
         for arrival in person.tenth(sensor) {
             let _ = arrivals.send(arrival);
         }
+        if person.kills() {
+            return End::Killed;
+        }
         let Some((outcome, refused)) = go_on(session.as_mut()) else {
             continue;
         };
@@ -238,14 +265,14 @@ fn run(sensor: &Sensor, person: &mut Person, out: &Path, more: &str) -> End {
             (Some(unit), _) if unit.stored.is_some() => {
                 let file = out.join("calibration.toml");
                 match Calibration::read(&file).ok().and_then(|c| c.judgement) {
-                    // A drift has no bias to compare with.
+                    // A drift has no bias to compare with, and two units have no parameters.
                     Some(judgement)
-                        if sensor.board.drift != 0.0
+                        if (sensor.board.drift != 0.0 || person.swapped())
                             && judgement.kind >= JudgementKind::Unexplained =>
                     {
                         End::Not(format!("stored, and judged {judgement}"))
                     }
-                    _ => judged(sensor, &file),
+                    _ => judged(&person.truths(sensor), &file),
                 }
             }
             (Some(unit), why) => {
@@ -261,9 +288,9 @@ fn run(sensor: &Sensor, person: &mut Person, out: &Path, more: &str) -> End {
     End::Stuck(last)
 }
 
-fn judged(sensor: &Sensor, file: &Path) -> End {
-    let truth = &sensor.board.truth;
-    match (errors(file, truth), half_widths(file, truth)) {
+/// The calibration beside the truth of the power-on that it fits best.
+fn judged(truths: &[Truth], file: &Path) -> End {
+    let beside = |truth: &Truth| match (errors(file, truth), half_widths(file, truth)) {
         (Ok(errors), Ok(both)) => {
             let all: Vec<f64> = both
                 .concat()
@@ -271,13 +298,19 @@ fn judged(sensor: &Sensor, file: &Path) -> End {
                 .filter(|w| w.is_finite())
                 .collect();
             let outside = all.iter().filter(|w| **w > 1.0).count();
-            End::Stored(
+            Ok((
                 errors,
                 [outside, all.len()],
                 all.into_iter().fold(0.0, f64::max),
-            )
+            ))
         }
-        (Err(why), _) | (_, Err(why)) => End::Not(why),
+        (Err(why), _) | (_, Err(why)) => Err(why),
+    };
+    let each: Result<Vec<_>, String> = truths.iter().map(beside).collect();
+    match each.map(|each| each.into_iter().min_by(|a, b| a.2.total_cmp(&b.2))) {
+        Ok(Some((errors, outside, worst))) => End::Stored(errors, outside, worst),
+        Ok(None) => End::Not("no truth".into()),
+        Err(why) => End::Not(why),
     }
 }
 

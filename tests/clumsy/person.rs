@@ -1,11 +1,48 @@
 //! A person with a board in hands, who errs in the ways of a seed.
 
+use mimu_tests::stored_calibration::Truth;
 use mimu_tests::text_board::{
     GRAVITY, Matrix, Random, Turn, Vector, product, rotation, times, transposed, unit,
 };
 use mimu_wizard::relay::{Arrival, Stamped};
 
 use crate::sensors::Sensor;
+
+/// What goes wrong in every session besides.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Trouble {
+    /// The gyro drifts.
+    Drift,
+    /// The board's clock is wrong.
+    Clock,
+    /// Biases differ after each power-on.
+    Steps,
+    /// Another unit is at the cable from some time on.
+    Swap,
+    /// The command is killed.
+    Kills,
+}
+
+impl Trouble {
+    /// By its name.
+    pub fn named(name: &str) -> Option<Self> {
+        Some(match name {
+            "drift" => Self::Drift,
+            "clock" => Self::Clock,
+            "steps" => Self::Steps,
+            "swap" => Self::Swap,
+            "kills" => Self::Kills,
+            _ => return None,
+        })
+    }
+}
+
+/// Steps of the biases at a power-on, standard deviations: rad/s and m/s².
+const BIAS_STEPS: [f64; 2] = [0.1 * std::f64::consts::PI / 180.0, 5e-3 * 9.80665];
+/// Mean time between pulled cables where biases step or units are swapped, s.
+const PULLED_S: f64 = 150.0;
+/// When another unit may come, s.
+const SWAPPED_S: f64 = 90.0;
 
 /// What the person and the cable do.
 #[derive(Clone, Debug)]
@@ -64,6 +101,14 @@ impl Habits {
         }
     }
 
+    /// With a trouble that takes a pulled cable.
+    pub fn with(mut self, trouble: Option<Trouble>) -> Self {
+        if matches!(trouble, Some(Trouble::Steps | Trouble::Swap)) {
+            self.pulled_s = PULLED_S;
+        }
+        self
+    }
+
     /// The faults in words.
     pub fn names(&self) -> Vec<&'static str> {
         let all = [
@@ -117,11 +162,17 @@ pub struct Person {
     away_until_s: Option<f64>,
     stalled_until_s: f64,
     last_line: String,
+    trouble: Option<Trouble>,
+    /// Biases of each power-on beside the board's, the last one of now: rate and force, SI.
+    biases: Vec<[Vector; 2]>,
+    /// Another unit in its place.
+    other: Option<Sensor>,
+    seed: u64,
 }
 
 impl Person {
     /// At the beginning.
-    pub fn new(habits: &Habits, seed: u64) -> Self {
+    pub fn new(habits: &Habits, seed: u64, trouble: Option<Trouble>) -> Self {
         let mut random = Random::new(seed ^ 0x9e25);
         let phases = [0.0; 6].map(|_: f64| std::f64::consts::TAU * random.even());
         Self {
@@ -142,6 +193,48 @@ impl Person {
             away_until_s: None,
             stalled_until_s: 0.0,
             last_line: String::new(),
+            trouble,
+            biases: vec![[[0.0; 3]; 2]],
+            other: None,
+            seed,
+        }
+    }
+
+    /// Whether the command is killed now.
+    pub fn kills(&mut self) -> bool {
+        self.trouble == Some(Trouble::Kills) && self.happens(crate::KILLED_S)
+    }
+
+    /// Whether another unit has come.
+    pub fn swapped(&self) -> bool {
+        self.other.is_some()
+    }
+
+    /// The parameters of the unit at the cable, with its biases at each power-on. A calibration has those of the last one before its last dwell.
+    pub fn truths(&self, sensor: &Sensor) -> Vec<Truth> {
+        let truth = self.other.as_ref().unwrap_or(sensor).board.truth;
+        let of = |biases: &[Vector; 2]| {
+            let mut own = truth;
+            for (triad, step) in own.triads.iter_mut().zip(biases) {
+                let by = times(&triad.matrix, *step);
+                triad.bias = std::array::from_fn(|i| triad.bias[i] + by[i]);
+            }
+            own
+        };
+        self.biases.iter().map(of).collect()
+    }
+
+    /// The supply comes back.
+    fn powered(&mut self) {
+        (self.line, self.started_s) = (0, self.now_s);
+        if self.trouble == Some(Trouble::Steps) {
+            let random = &mut self.random;
+            let step = BIAS_STEPS.map(|sigma| [0.0; 3].map(|_| sigma * random.normal()));
+            self.biases.push(step);
+        }
+        if self.trouble == Some(Trouble::Swap) && self.now_s > SWAPPED_S && !self.swapped() {
+            // The same part at the same rate.
+            self.other = Some(Sensor::of(self.seed + 30_000));
         }
     }
 
@@ -173,7 +266,7 @@ impl Person {
     }
 
     /// What comes from the board within the next tenth of a second.
-    pub fn tenth(&mut self, sensor: &Sensor) -> Vec<Stamped> {
+    pub fn tenth(&mut self, first: &Sensor) -> Vec<Stamped> {
         let begin_s = self.now_s;
         let mut out = Vec::new();
         if let Some(until) = self.away_until_s {
@@ -181,7 +274,7 @@ impl Person {
             self.now_s += 0.1;
             if self.now_s > until {
                 self.away_until_s = None;
-                (self.line, self.started_s) = (0, self.now_s);
+                self.powered();
                 out.push((self.now_s, Arrival::Opened));
             }
             return out;
@@ -199,6 +292,8 @@ impl Person {
             self.stalled_until_s = begin_s + 1.2;
         }
         self.decide();
+        let other = self.other.take();
+        let sensor = other.as_ref().unwrap_or(first);
         let mut text = String::new();
         let until_s = begin_s + 0.1;
         // By its own clock, which begins with its start.
@@ -213,6 +308,7 @@ impl Person {
                 text.push_str(&written);
             }
         }
+        self.other = other;
         self.now_s = until_s;
         out.push((until_s, Arrival::Bytes(text.into_bytes())));
         out
@@ -319,6 +415,9 @@ impl Person {
         let [most_dps, most_g] = sensor.range;
         let rate = rate.map(|w| w.clamp(-most_dps.to_radians(), most_dps.to_radians()));
         let force = force.map(|f| f.clamp(-most_g * 9.80665, most_g * 9.80665));
+        let with = |input: Vector, bias: Vector| std::array::from_fn(|k| input[k] + bias[k]);
+        let [of_rate, of_force] = self.biases.last().copied().unwrap_or_default();
+        let (rate, force) = (with(rate, of_rate), with(force, of_force));
         let line = sensor.board.line(own_s, rate, force, &mut self.random);
         // A board that has lost its sensor writes its last readings with new times.
         match (

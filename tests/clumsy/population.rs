@@ -18,7 +18,7 @@ pub fn run(part: u64, units: u64, sessions: u64, kept: Option<&Path>) -> ExitCod
     first.par_iter().for_each(|seed| {
         println!(
             "population: {}",
-            session(*seed, Sensor::of(*seed), Some(&made), "").line()
+            session(*seed, Sensor::of(*seed), None, (Some(&made), "")).line()
         );
     });
     // Each session is a folder with the calibration and what else the wizard wrote; all boards have the same name.
@@ -43,7 +43,7 @@ pub fn run(part: u64, units: u64, sessions: u64, kept: Option<&Path>) -> ExitCod
     let further: Vec<u64> = seeds(units, sessions).collect();
     let each = further.par_iter().map(|seed| {
         let both = [("", None), (&with[..], kept)]
-            .map(|(more, kept)| session(*seed, Sensor::of(*seed), kept, more));
+            .map(|(more, kept)| session(*seed, Sensor::of(*seed), None, (kept, more)));
         println!("without: {}\nwith:    {}", both[0].line(), both[1].line());
         both
     });
