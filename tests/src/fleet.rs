@@ -38,8 +38,13 @@ pub struct Drawn {
     pub truth: [[f64; 12]; 2],
 }
 
-/// Unit `seed` of the population. Scale factors of a triad have a correlation of a half. A stranger has the scale factor x of its gyro that many standard deviations off.
-pub fn unit(seed: u64, stranger: f64) -> Drawn {
+/// What makes a unit none of the population: a parameter (of gyro or accelerometer, by its number among the twelve), and by how many standard deviations it is off.
+pub type Stranger = ([usize; 2], f64);
+/// A unit of the population.
+pub const OF_IT: Stranger = ([0; 2], 0.0);
+
+/// Unit `seed` of the population. Scale factors of a triad have a correlation of a half.
+pub fn unit(seed: u64, stranger: Stranger) -> Drawn {
     let text = include_str!("../../rig/rigs/sessions.toml");
     let mut file = RigFile::parse(&Source::new("sessions.toml", text)).expect("a rig");
     file.curves = CurvesFile::default();
@@ -63,7 +68,13 @@ pub fn unit(seed: u64, stranger: f64) -> Drawn {
         })
     });
     let mut truth: [[f64; 12]; 2] = truth;
-    truth[0][0] += stranger * SCALE[0] * SIZES[0][0];
+    let ([s, k], off) = stranger;
+    let raw = if matches!(k / 3, 0 | 3) {
+        SCALE[s]
+    } else {
+        1.0
+    };
+    truth[s][k] += off * raw * SIZES[s][k / 3];
     file.unit.gyro_affine = Some(affine(&truth[0]));
     file.unit.accel_affine = Some(affine(&truth[1]));
     Drawn { file, truth }
@@ -125,7 +136,7 @@ fn fitted_by(drawn: &Drawn, plan: &str, seed: u64, prior: Option<&Arc<Prior>>) -
 /// The prior of `units` units, each fitted to twenty poses, as its file is read.
 pub fn prior(units: u64) -> Arc<Prior> {
     let one = |seed: u64| {
-        let made = fitted(&unit(seed, 0.0), 20, seed, None).ok()?;
+        let made = fitted(&unit(seed, OF_IT), 20, seed, None).ok()?;
         let calibration = Calibration::of(&made, &[], "2026-01-05T12:00:00Z").ok()?;
         Some(Measurement {
             file: format!("u{seed}.toml"),
@@ -221,7 +232,7 @@ pub fn study(
     seeds: std::ops::Range<u64>,
     poses: usize,
     prior: Option<&Arc<Prior>>,
-    stranger: f64,
+    stranger: Stranger,
 ) -> (Judged, usize, usize) {
     let one = |seed: u64| {
         let drawn = unit(seed, stranger);
@@ -302,7 +313,7 @@ impl Promise {
             let _ = writeln!(plan, "[[step]]\nup = {up:?}\ndwell_s = {DWELL_S:?}");
         }
         let one = |seed: u64| {
-            let mut drawn = unit(seed, 0.0);
+            let mut drawn = unit(seed, OF_IT);
             drawn.file.hands.aim_deg = aim_deg;
             let fit = fitted_by(&drawn, &plan, 8_000_000 + seed, Some(prior)).ok()?;
             let kept = fit.estimator(Sensor::Accel).ends_with("and a prior");

@@ -25,7 +25,7 @@ pub(crate) mod uncalibrated;
 use std::sync::Arc;
 
 use crate::estimate::least_squares::{POORLY_DETERMINED, Scatter};
-use crate::estimate::{Estimated, Observation};
+use crate::estimate::{Estimated, Observation, magnitude};
 use crate::prepared::Prepared;
 use crate::prior::{FALSE_STRANGER, Prior};
 use crate::quantity::{Figure, Sensor};
@@ -39,7 +39,7 @@ use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{RawUnit, Reference};
 
 use crate::observable::Observable;
-use by_gravity::fit_gravity;
+use by_gravity::{fit_gravity, with_priors};
 use by_rate::fit_rates;
 pub(crate) use determined::faces_not_up;
 use known::fit_known;
@@ -201,7 +201,9 @@ pub fn fit_or_faces(prepared: Prepared, options: Options) -> Result<Fit> {
 /// Triads whose data contradict the `prior` that they were fitted with.
 fn strangers(fitted: &Fit, prior: &Prior) -> Vec<(Sensor, Warning)> {
     let each = fitted.sensors.iter().filter_map(|fit| {
-        let moved = prior.triad(fit.sensor)?.movement(&fit.estimated.triad)?;
+        let joint = with_priors(fitted, prior, fit.sensor);
+        let triad = joint.as_ref().unwrap_or(&fit.estimated.triad);
+        let moved = prior.triad(fit.sensor)?.movement(triad)?;
         let warning = Warning::NotOfPopulation {
             p: moved.p,
             parameter: format!("{} {}", moved.most.0.words(), moved.most.axis()),
@@ -245,6 +247,7 @@ fn fit_as_prepared(mut prepared: Prepared, options: Options) -> Result<Fit> {
         plausible::check_readings(&prepared)?;
     }
     reference_error::refuse_unused(&prepared, options.method)?;
+    one_bias(&mut prepared);
     let mut with_all = PerSensor::default();
     if prepared.manifest.reference == Reference::Gravity {
         // Turns connect dwells that are not left out, so the poses are judged first.
@@ -258,6 +261,8 @@ fn fit_as_prepared(mut prepared: Prepared, options: Options) -> Result<Fit> {
     let at_none = rated.as_ref().and_then(|r| r.exclude_dwells(&mut prepared));
     let mut warnings = prepared.condensed.warnings.clone();
     warnings.extend(suspicions);
+    let others = prepared.power_ons.others();
+    warnings.extend((others > 0).then_some(Warning::PowerOns { others }));
     warnings.extend(prepared.dwells.warnings.iter().cloned());
     warnings.extend(prepared.implausible_rate());
     warnings.extend(without_temperature(&prepared));
@@ -312,6 +317,38 @@ fn fit_as_prepared(mut prepared: Prepared, options: Options) -> Result<Fit> {
         warnings,
     })
 }
+
+/// Moves what the accelerometer read before the last power-on to the bias of the last, if the poses determine both. The fit finds what remains of the
+/// steps, and widens the intervals by what it does not know of them.
+fn one_bias(prepared: &mut Prepared) {
+    let by_gravity = prepared.manifest.reference == Reference::Gravity;
+    if prepared.power_ons.others() == 0 || !by_gravity || !prepared.has(Sensor::Accel) {
+        return;
+    }
+    let g = prepared.manifest.gravity_mps2;
+    for _ in 0..BIAS_ROUNDS {
+        let poses = prepared.observations(Sensor::Accel);
+        let Some(first) = magnitude::first_guess(&poses, g) else {
+            return;
+        };
+        let variances = prepared.magnitude_variances(&first, &poses);
+        let steps = magnitude::bias_steps(&poses, &variances, g, &prepared.power_ons);
+        let (Ok(steps), Some(to_raw)) = (steps, first.matrix.try_inverse()) else {
+            return;
+        };
+        for (i, dwell) in prepared.dwells.list.iter_mut().enumerate() {
+            let later = prepared.power_ons.later(i);
+            let step = later.checked_sub(1).map(|k| to_raw * steps[k]);
+            let accel = &mut dwell.raw[Sensor::Accel.channels()];
+            for (mean, step) in accel.iter_mut().zip(step.iter().flatten()) {
+                mean.mean += step;
+            }
+        }
+    }
+}
+
+/// How often the accelerometer's steps are found: the scale factors that move its readings err by a few per cent at first.
+const BIAS_ROUNDS: usize = 3;
 
 /// Leaves out what `find` finds. Returns the triad fitted with everything, if anything was left out.
 fn leave_out(prepared: &mut Prepared, find: impl Fn(&Prepared) -> Outlying) -> Option<Triad> {

@@ -22,6 +22,7 @@ use crate::signal::contrast::{Contrast, contrasts};
 use crate::signal::course::Course;
 use crate::signal::dwell::{Dwell, Dwells, Fault, LeftOut};
 use crate::signal::dwells_of_files;
+use crate::signal::power_ons::{PowerOns, with_one_bias};
 use crate::signal::rails::refuse_dead_channels;
 use crate::signal::stillness::{DwellSearch, Steps};
 use crate::signal::unit_in_si;
@@ -52,6 +53,8 @@ pub struct Prepared {
     pub earth_on_table: Option<Arc<EarthOnTable>>,
     /// What the population of the unit's kind says of it; `None` if nothing is given.
     pub prior: Option<Arc<Prior>>,
+    /// The power-ons that its dwells are of, if gravity is the only reference. The readings before the last are moved to the biases of the last.
+    pub power_ons: PowerOns,
 }
 
 impl Prepared {
@@ -138,8 +141,14 @@ impl Prepared {
         if let Some(BiasRemoval::HighPass(filter)) = &bias_removal {
             condensed = filter.undo(condensed);
         }
-        let mut dwells = Dwells::find(&condensed, &manifest, search)
-            .map_err(|e| e.map(|e| e.place = format!("{place}, {}", e.place)))?;
+        let find = |condensed: &Condensed| {
+            Dwells::find(condensed, &manifest, search)
+                .map_err(|e| e.map(|e| e.place = format!("{place}, {}", e.place)))
+        };
+        if by_hand {
+            condensed = with_one_bias(condensed, &manifest, find);
+        }
+        let mut dwells = find(&condensed)?;
         let at = manifest.latitude_deg;
         let gravity = at.and_then(|at| Warning::of_gravity(manifest.gravity_mps2, at));
         dwells.warnings.extend(gravity);
@@ -153,7 +162,12 @@ impl Prepared {
             .warnings
             .extend(bias_removal.map(Warning::BiasRemoved));
         let noise = Noise::within(&dwells.list, &condensed, &dwells.rails);
+        let power_ons = match by_hand {
+            true => PowerOns::of(&dwells.list, &manifest),
+            false => PowerOns::default(),
+        };
         let prepared = Self {
+            power_ons,
             reference_error: manifest.reference_error.clone(),
             manifest,
             condensed: Arc::new(condensed),

@@ -11,6 +11,7 @@ pub mod increment;
 pub mod jump;
 pub(crate) mod log_fault;
 pub mod moments;
+pub mod power_ons;
 pub mod quantisation_step;
 pub mod rails;
 pub(crate) mod ramp;

@@ -73,6 +73,9 @@ pub enum Warning {
     /// A clock that the user trusts although it does not agree with the computer's.
     #[error("{}, and it was trusted: if the computer's is right, the gyro's scale factors err by that factor", .0.words())]
     TrustedClock(ClockRate),
+    /// Power-ons within the recording before the last one.
+    #[error("the device restarted within it: {} its own biases, and those given are of the last", match .others { 1 => "the power-on before has".to_string(), n => format!("each of the {n} power-ons before has") })]
+    PowerOns { others: usize },
     /// Sample rate that no inertial unit has, Hz.
     #[error("{} Hz is not the sample rate of an inertial unit: are the times in ms or µs instead of s? All rates and the scale factors of the gyro would be wrong by the same factor", significant(*.rate_hz))]
     ImplausibleRate { rate_hz: f64 },

@@ -66,10 +66,7 @@ impl Growing {
             rows: 0,
             disk,
         };
-        growing.write_manifest(&Manifest {
-            unfinished: true,
-            ..manifest.clone()
-        })?;
+        growing.write_unfinished(manifest)?;
         sync_directory(folder(directory));
         Ok(growing)
     }
@@ -88,11 +85,12 @@ impl Growing {
         })
     }
 
-    /// Waits until everything written is on the disk; returns the size of the samples file in bytes.
-    pub fn sync(&self) -> Result<u64> {
+    /// Waits until everything written is on the disk, and the manifest so far; returns the size of the samples file in bytes.
+    pub fn sync(&self, manifest: &Manifest) -> Result<u64> {
         let Some(csv) = &self.csv else {
             return Ok(0);
         };
+        self.write_unfinished(manifest)?;
         let file = csv.file();
         let synced = file.sync_data().and_then(|()| file.metadata());
         synced
@@ -165,6 +163,13 @@ impl Growing {
             }
         })?;
         writer.finish(&manifest).map(drop)
+    }
+
+    fn write_unfinished(&self, manifest: &Manifest) -> Result<()> {
+        self.write_manifest(&Manifest {
+            unfinished: true,
+            ..manifest.clone()
+        })
     }
 
     /// Replaces the manifest.

@@ -366,6 +366,10 @@ impl OpenRecording {
                 manifest.power_on_s = written.power_on_s;
                 let clocks = manifest.clock.into_iter().chain(written.clock);
                 manifest.clock = clocks.min_by(|a, b| a.half_width.total_cmp(&b.half_width));
+                if let (Some(now), Some(before)) = (&mut manifest.recorded, written.recorded) {
+                    now.restarts = before.restarts;
+                    now.missing += before.missing;
+                }
                 let growing = Growing::resume(&directory, columns, rows, bytes)?;
                 let recording = Recording::open(&directory)?.with_written_times();
                 recording.for_each_batch(
@@ -405,7 +409,7 @@ impl OpenRecording {
 
     /// Rows and bytes that are on disk for certain.
     pub fn settled(&self) -> Result<(u64, u64)> {
-        Ok((self.growing.rows(), self.growing.sync()?))
+        Ok((self.growing.rows(), self.growing.sync(&self.manifest)?))
     }
 
     /// Discards the dwell with this number.

@@ -195,7 +195,12 @@ pub fn judge_all(by: &Prepared, calibration: &Calibration) -> Result<Judged> {
 }
 
 fn judged(by: &Prepared, calibration: &Calibration, promised: Option<&Fit>) -> Result<Judged> {
-    let found = verify_since(by, calibration, PowerOn::Same)?;
+    let recorded = by.manifest.recorded.as_ref();
+    let power_on = match recorded.is_some_and(|r| !r.restarts.is_empty()) {
+        true => PowerOn::Another,
+        false => PowerOn::Same,
+    };
+    let found = verify_since(by, calibration, power_on)?;
     let of = |(sensor, s): (Sensor, &SensorVerification)| {
         let fitted = promised.and_then(|f| f.sensor(sensor));
         SensorJudged::of(sensor, s, fitted.and_then(|f| f.held_out_rms()))

@@ -4,7 +4,7 @@ use std::ffi::OsStr;
 use std::fs;
 
 use mimu::{Calibration, Sensor};
-use mimu_tests::fleet::{Judged, Promise, fitted, prior, study, unit};
+use mimu_tests::fleet::{Judged, OF_IT, Promise, fitted, prior, study, unit};
 
 /// Share inside, over all parameters.
 fn inside(judged: &Judged) -> f64 {
@@ -15,7 +15,7 @@ fn inside(judged: &Judged) -> f64 {
 #[test]
 fn six_poses_with_the_prior_determine_scale_factors_and_biases() {
     let prior = prior(40);
-    let (six, refused, given_up) = study(1000..1012, 6, Some(&prior), 0.0);
+    let (six, refused, given_up) = study(1000..1012, 6, Some(&prior), OF_IT);
     assert_eq!((refused, given_up), (0, 0));
     // 252 values: four standard deviations of the share are 5.5 %.
     assert!(inside(&six) > 0.895, "{} {:?}", inside(&six), six.shares);
@@ -30,7 +30,7 @@ fn six_poses_with_the_prior_determine_scale_factors_and_biases() {
         assert!(six.width(name) < most, "{name}: {}", six.width(name));
     }
     // Six poses do not determine an accelerometer without a prior.
-    let alone = fitted(&unit(1000, 0.0), 6, 7_001_000, None);
+    let alone = fitted(&unit(1000, OF_IT), 6, 7_001_000, None);
     let alone = alone.unwrap_err().to_string();
     assert!(alone.contains("at least 9 different poses"), "{alone}");
 }
@@ -54,14 +54,19 @@ fn a_design_beside_the_prior_predicts_the_half_widths_that_fits_state() {
 #[test]
 fn few_poses_of_a_stranger_are_not_believed_to_be_of_the_population() {
     let prior = prior(40);
-    let (_, _, given_up) = study(20_000..20_006, 9, Some(&prior), 8.0);
-    assert!(given_up >= 5, "{given_up} of 6");
+    for of in [[0, 0], [0, 9], [1, 0], [1, 6], [1, 7], [1, 8], [1, 9]] {
+        for poses in [6, 9] {
+            let (_, _, given_up) = study(20_000..20_006, poses, Some(&prior), (of, 8.0));
+            println!("{of:?}, {poses} poses: {given_up} of 6");
+            assert!(given_up >= 5, "{of:?}, {poses} poses: {given_up} of 6");
+        }
+    }
 }
 
 #[test]
 fn a_unit_that_is_not_of_the_population_is_found_and_fitted_without_the_prior() {
     let prior = prior(40);
-    let stranger = unit(2000, 8.0);
+    let stranger = unit(2000, ([0, 0], 8.0));
     let found =
         fitted(&stranger, 20, 3, Some(&prior)).expect("twenty poses suffice without a prior");
     let warning = found
@@ -96,7 +101,7 @@ fn a_unit_that_is_not_of_the_population_is_found_and_fitted_without_the_prior() 
 fn the_commands_write_a_prior_and_fit_with_it() {
     let folder = tempfile::tempdir().expect("a folder");
     for seed in 1..=24 {
-        let made = fitted(&unit(seed, 0.0), 20, seed, None).expect("a fit");
+        let made = fitted(&unit(seed, OF_IT), 20, seed, None).expect("a fit");
         let mut file = Calibration::of(
             &made,
             &[],
@@ -145,7 +150,7 @@ fn the_commands_write_a_prior_and_fit_with_it() {
             .contains("Fleet of 24 units")
     );
     let six =
-        mimu_tests::bench::written(&mimu_tests::bench::hand_plan(6), &unit(3000, 0.0).file, 5);
+        mimu_tests::bench::written(&mimu_tests::bench::hand_plan(6), &unit(3000, OF_IT).file, 5);
     let recording = six.path().join("recording");
     let with = [
         o("fit"),
@@ -206,7 +211,7 @@ fn coverage_of_six_poses_with_the_prior_against_twenty_without() {
                 continue;
             }
             let (judged, refused, given_up) =
-                study(10_000..10_200, poses, with.then_some(&prior), 0.0);
+                study(10_000..10_200, poses, with.then_some(&prior), OF_IT);
             println!("| {poses} | {with} | inside, % |{}", judged.shares.line());
             println!(
                 "| | | half-width, σ |{}  all {:.1} %, {refused} refused, {given_up} given up",
@@ -216,7 +221,7 @@ fn coverage_of_six_poses_with_the_prior_against_twenty_without() {
             assert!(inside(&judged) > 0.93, "{}", inside(&judged));
         }
         for off in [3.0, 5.0, 8.0] {
-            let (judged, refused, given_up) = study(20_000..20_050, 6, Some(&prior), off);
+            let (judged, refused, given_up) = study(20_000..20_050, 6, Some(&prior), ([0, 0], off));
             println!(
                 "strangers of {off} σ, six poses: {given_up} of 50 found, {refused} refused, {:.1} % inside",
                 100.0 * inside(&judged)

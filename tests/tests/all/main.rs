@@ -20,6 +20,7 @@ mod noise_in_use;
 mod noise_of_the_bench;
 mod papers;
 mod planted;
+mod power_ons;
 mod public_data;
 mod ramps;
 mod real_ferraris;

@@ -17,6 +17,7 @@ use crate::observation::turn::Rest;
 use crate::observation::{LOWER, place};
 use crate::prior::TriadPrior;
 use crate::quantity::{AXES, Sensor, plural};
+use crate::signal::power_ons::PowerOns;
 use crate::triad::{Covariance, Forward, Triad, affine, vector};
 use crate::warning::Warning;
 
@@ -38,6 +39,8 @@ pub struct KnownMagnitudes<'a> {
     pub rests: &'a [Rest],
     /// What is known of the parameters beforehand.
     pub prior: Option<&'a TriadPrior>,
+    /// The power-ons that the dwells are of.
+    pub power_ons: &'a PowerOns,
 }
 
 /// Readings in units in which a perfect sensor has C = 1 and o = 0 at the largest magnitude.
@@ -143,22 +146,65 @@ pub fn rough(observations: &[Observation], known: &KnownMagnitudes) -> Option<Af
     Some(Sphere::through(observations, &shares, known.rests)?.model(unit))
 }
 
+impl<'a> KnownMagnitudes<'a> {
+    /// Of an accelerometer: `gravity`, m/s², in one power-on. `level_of` are as many zeros as observations.
+    pub fn gravity(gravity: &'a f64, level_of: &'a [usize]) -> Self {
+        Self {
+            sensor: Sensor::Accel,
+            levels: std::slice::from_ref(gravity),
+            level_sigma: 0.0,
+            level_of,
+            rests: &[],
+            prior: None,
+            power_ons: PowerOns::ONE,
+        }
+    }
+}
+
 /// Fits C and o of an accelerometer to `|C u + o| = gravity` (m/s²) over all observations, and to a `prior`; see [`estimate`].
 pub fn by_gravity(
     observations: &[Observation],
     variances: &[f64],
     gravity: f64,
     prior: Option<&TriadPrior>,
+    power_ons: &PowerOns,
 ) -> Result<Estimated, Failure> {
+    let level_of = vec![0; observations.len()];
     let known = KnownMagnitudes {
-        sensor: Sensor::Accel,
-        levels: &[gravity],
-        level_sigma: 0.0,
-        level_of: &vec![0; observations.len()],
-        rests: &[],
         prior,
+        power_ons,
+        ..KnownMagnitudes::gravity(&gravity, &level_of)
     };
     estimate(observations, variances, &known)
+}
+
+/// By what the accelerometer's bias differs in the power-ons before the last, m/s²: as many as [`PowerOns::others`], from the latest to the earliest.
+///
+/// # Errors
+/// As those of [`by_gravity`].
+pub fn bias_steps(
+    observations: &[Observation],
+    variances: &[f64],
+    gravity: f64,
+    power_ons: &PowerOns,
+) -> Result<Vec<Vector3<f64>>, Failure> {
+    let level_of = vec![0; observations.len()];
+    let known = KnownMagnitudes {
+        power_ons,
+        ..KnownMagnitudes::gravity(&gravity, &level_of)
+    };
+    refuse_too_little(observations, &known)?;
+    let by = ByMagnitudes::of(observations, variances, &known)?;
+    let solved = by.fit.solve(by.solved()?, &|_, _| 0.0, &|_| Ok(()))?;
+    let step = |k| {
+        let range = solved
+            .values
+            .range(ParameterBlock::BiasStep(Sensor::Accel, k));
+        range.map_or_else(Vector3::zeros, |of| {
+            solved.values.all.fixed_rows::<3>(of.start).into_owned()
+        })
+    };
+    Ok((1..=power_ons.others()).map(step).collect())
 }
 
 /// Refuses experiments that cannot determine the nine parameters, whatever the noise.
@@ -279,6 +325,8 @@ impl<'a> ByMagnitudes<'a> {
             coordinates.push(Coordinates::around_zero(block));
         }
         let rows = [of_dwells, factors.rows()];
+        let steps = factors.bias_steps(known.sensor, known.power_ons);
+        coordinates.extend(steps.into_iter().map(Coordinates::around_zero));
         if let Some(prior) = known.prior {
             factors.known(Kind::Population(known.sensor, prior), None);
         }
@@ -335,7 +383,8 @@ impl<'a> ByMagnitudes<'a> {
 
     /// A level that the others contradict.
     fn contradicted(&self, p: &DVector<f64>) -> Option<Warning> {
-        let off = p.iter().skip(PARAMETERS).enumerate();
+        let levels = self.rows[1] - self.rows[0];
+        let off = p.iter().skip(PARAMETERS).take(levels).enumerate();
         let worst = off.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
         let (l, off) = worst.filter(|w| w.1.abs() > CONTRADICTED * self.known.level_sigma)?;
         Some(Warning::RatesContradict {

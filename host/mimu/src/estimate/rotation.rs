@@ -19,7 +19,29 @@ use crate::observation::closure::Closures;
 use crate::observation::turn::{Motion, Rest, Turn};
 use crate::prior::TriadPrior;
 use crate::quantity::{AXES, Sensor};
+use crate::signal::power_ons::PowerOns;
 use crate::triad::{Covariance, Part, Triad, vector};
+
+/// Turns and rests of a gyro, and what its fit starts from.
+#[derive(Clone, Copy)]
+pub struct Data<'a> {
+    /// Turns from dwell to dwell.
+    pub turns: &'a [Turn<'a>],
+    /// Dwells at rest.
+    pub rest: &'a [Rest],
+    /// The accelerometer.
+    pub accel: &'a Triad,
+    /// For the first guess, if there is neither a start nor a prior.
+    pub motions: &'a [Motion],
+    /// The first guess, if there is a better one.
+    pub start: Option<&'a Affine<f64>>,
+    /// Magnitude of gravity, m/s².
+    pub gravity: f64,
+    /// What is known of the gyro beforehand; whole turns do not use it.
+    pub prior: Option<&'a TriadPrior>,
+    /// The power-ons that the dwells are of.
+    pub power_ons: &'a PowerOns,
+}
 
 /// The elements of C across the axes.
 const CROSS: [usize; 6] = [1, 2, 3, 5, 6, 7];
@@ -73,34 +95,25 @@ fn undetermined(shape: &Observability) -> Failure {
     }
 }
 
-/// Fits `ω = C u + o` to the turns and to the dwells (`rest`) together.
+/// Fits `ω = C u + o` to the turns and to the dwells at rest together.
 ///
-/// The directions of gravity come from `accel`. Its errors are common to all turns, so its covariance is propagated into that of the gyro. (Without
-/// this, the intervals of a quiet gyro beside a noisy accelerometer contained the truth in 75 to 81 % of the cases.) `motions` give the first guess
-/// unless `start` or a `prior` does; `gravity` in m/s².
-pub fn estimate(
-    turns: &[Turn],
-    rest: &[Rest],
-    accel: &Triad,
-    motions: &[Motion],
-    start: Option<&Affine<f64>>,
-    gravity: f64,
-    prior: Option<&TriadPrior>,
-) -> Result<Estimated, Failure> {
-    if prior.is_none() || rest.is_empty() {
-        refuse_few(turns, rest, &Closures::default())?;
+/// The directions of gravity come from the accelerometer. Its errors are common to all turns, so its covariance is propagated into that of the gyro. (Without
+/// this, the intervals of a quiet gyro beside a noisy accelerometer contained the truth in 75 to 81 % of the cases.)
+pub fn estimate(data: &Data) -> Result<Estimated, Failure> {
+    if data.prior.is_none() || data.rest.is_empty() {
+        refuse_few(data.turns, data.rest, &Closures::default())?;
     }
-    let at_rest = mean_at_rest(rest);
-    let middle = prior.and_then(TriadPrior::middle);
-    let first = match start.or(middle.as_ref()) {
+    let at_rest = mean_at_rest(data.rest);
+    let middle = data.prior.and_then(TriadPrior::middle);
+    let first = match data.start.or(middle.as_ref()) {
         Some(start) => start.matrix,
-        None => guess(motions, &at_rest, gravity).ok_or_else(|| {
+        None => guess(data.motions, &at_rest, data.gravity).ok_or_else(|| {
             Failure::NoSolution(
                 "no scale factor of the gyro makes its turns agree with those of gravity".into(),
             )
         })?,
     };
-    fitted(turns, rest, accel, &first, (&Closures::default(), prior))
+    fitted(data, &first, &Closures::default())
 }
 
 /// Mean reading at rest.
@@ -123,16 +136,18 @@ pub(super) fn refuse_few(turns: &[Turn], rest: &[Rest], whole: &Closures) -> Res
     Ok(())
 }
 
-/// The fit from the matrix `first` on, with the `whole` ones among the turns.
+/// The fit from the matrix `first` on, with the `whole` ones among the turns, and without a prior.
 pub(super) fn from(
-    turns: &[Turn],
-    rest: &[Rest],
-    accel: &Triad,
+    data: &Data,
     first: &Matrix3<f64>,
     whole: &Closures,
 ) -> Result<Estimated, Failure> {
-    refuse_few(turns, rest, whole)?;
-    fitted(turns, rest, accel, first, (whole, None))
+    refuse_few(data.turns, data.rest, whole)?;
+    let alone = Data {
+        prior: None,
+        ..*data
+    };
+    fitted(&alone, first, whole)
 }
 
 /// The turns, rests and whole turns of a gyro, and what is known beforehand.
@@ -145,13 +160,14 @@ struct ByTurns<'a> {
 }
 
 impl<'a> ByTurns<'a> {
-    fn of(
-        turns: &[Turn<'a>],
-        rest: &[Rest],
-        accel: &Triad,
-        first: &Matrix3<f64>,
-        (whole, prior): (&Closures, Option<&'a TriadPrior>),
-    ) -> Self {
+    fn of(data: &Data<'a>, first: &Matrix3<f64>, whole: &Closures) -> Self {
+        let Data {
+            turns,
+            rest,
+            accel,
+            prior,
+            ..
+        } = *data;
         let [gyro, of_accel] = Sensor::BOTH.map(ParameterBlock::Triad);
         let at_rest = mean_at_rest(rest);
         let start = Affine {
@@ -206,6 +222,8 @@ impl<'a> ByTurns<'a> {
         if let Some(prior) = prior {
             factors.known(Kind::Population(Sensor::Gyro, prior), None);
         }
+        let steps = factors.bias_steps(Sensor::Gyro, data.power_ons);
+        coordinates.extend(steps.into_iter().map(Coordinates::around_zero));
         let lost = "the fit of the gyro to the turns does not converge";
         // The first weights are a guess, so that there are two rounds or more.
         let mut fit = FactorFit::new(factors, coordinates, (1e-3, 2), lost);
@@ -241,14 +259,9 @@ impl<'a> ByTurns<'a> {
     }
 }
 
-fn fitted(
-    turns: &[Turn],
-    rest: &[Rest],
-    accel: &Triad,
-    first: &Matrix3<f64>,
-    (whole, prior): (&Closures, Option<&TriadPrior>),
-) -> Result<Estimated, Failure> {
-    let by = ByTurns::of(turns, rest, accel, first, (whole, prior));
+fn fitted(data: &Data, first: &Matrix3<f64>, whole: &Closures) -> Result<Estimated, Failure> {
+    let by = ByTurns::of(data, first, whole);
+    let (accel, prior) = (data.accel, data.prior);
     // The first weights: half a degree, and the scatter of the dwells.
     let extra = |group, residuals: &[f64]| match group {
         // Beside a prior they are those of the noise: with half a degree a prior that does not hold was believed, and what then remained of the turns was taken

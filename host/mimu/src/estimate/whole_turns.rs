@@ -9,13 +9,11 @@ use mimu_core::compensation::Affine;
 use nalgebra::{Matrix3, Vector3};
 
 use super::least_squares::POORLY_DETERMINED;
-use super::rotation::{self, from, guess, mean_at_rest};
+use super::rotation::{self, Data, from, guess, mean_at_rest};
 use super::{Estimated, Failure};
 use crate::observation::ByTriad;
 use crate::observation::closure::{Closure, ClosureError, Closures};
-use crate::observation::turn::{Motion, Path, Rest, Turn};
-use crate::prior::TriadPrior;
-use crate::triad::Triad;
+use crate::observation::turn::{Path, Turn};
 use crate::warning::Warning;
 
 /// Fewest turns of a whole turn: less is a turn from pose to pose.
@@ -53,24 +51,6 @@ pub struct Stated {
     pub vertical: [f64; 2],
     /// C of readings in SI.
     pub nominal: Option<Matrix3<f64>>,
-}
-
-/// Turns and rests, and what the first calibration starts from; see [`rotation::estimate`].
-pub struct Data<'a> {
-    /// Turns from dwell to dwell.
-    pub turns: &'a [Turn<'a>],
-    /// Dwells at rest.
-    pub rest: &'a [Rest],
-    /// The accelerometer.
-    pub accel: &'a Triad,
-    /// For the first guess.
-    pub motions: &'a [Motion],
-    /// The first guess, if there is a better one.
-    pub start: Option<&'a Affine<f64>>,
-    /// Magnitude of gravity, m/s².
-    pub gravity: f64,
-    /// What is known of the gyro beforehand; whole turns do not use it.
-    pub prior: Option<&'a TriadPrior>,
 }
 
 /// How turns end.
@@ -204,15 +184,11 @@ impl Stated {
     pub fn estimate(&self, data: &Data) -> Result<Estimated, Failure> {
         let (turns, rest) = (data.turns, data.rest);
         if rest.is_empty() {
-            return rotation::estimate(
-                turns,
-                rest,
-                data.accel,
-                data.motions,
-                None,
-                data.gravity,
-                None,
-            );
+            return rotation::estimate(&Data {
+                start: None,
+                prior: None,
+                ..*data
+            });
         }
         let at_rest = mean_at_rest(rest);
         let start = data.start.map(|start| start.matrix).or(self.nominal);
@@ -224,7 +200,11 @@ impl Stated {
             let short: Vec<Turn> = short
                 .filter(|turn| Path::of(&[*turn], &model).turns() < LONG)
                 .collect();
-            from(&short, rest, data.accel, &first, &Closures::default())
+            let short = Data {
+                turns: &short,
+                ..*data
+            };
+            from(&short, &first, &Closures::default())
         });
         let by_base = match &base {
             Some(Ok(base)) if base.condition < POORLY_DETERMINED => {
@@ -248,11 +228,11 @@ impl Stated {
                 base
             });
         }
-        let mut done = from(turns, rest, data.accel, &matrix, &found.closures)?;
+        let mut done = from(data, &matrix, &found.closures)?;
         while let Some((worst, warning)) = outlying(turns, &done, &found.closures) {
             found.closures.list.remove(worst);
             found.warnings.push(warning);
-            done = from(turns, rest, data.accel, &matrix, &found.closures)?;
+            done = from(data, &matrix, &found.closures)?;
         }
         done.notes.extend(found.warnings);
         Ok(done)

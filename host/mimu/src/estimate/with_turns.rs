@@ -11,15 +11,17 @@
 
 use mimu_core::compensation::Affine;
 
-use super::factor_fit::{Coordinates, FactorFit, HALF_DEGREE, mean_square};
+use super::factor_fit::{Coordinates, FactorFit, HALF_DEGREE, Solved, mean_square};
 use super::rotation::mean_at_rest;
 use super::{Estimated, Failure, Observation};
-use crate::factor::Factors;
+use crate::factor::{Factors, Kind};
 use crate::observable::Observable;
 use crate::observation::turn::{Rest, Turn};
 use crate::observation::{ALL, LOWER};
-use crate::quantity::Sensor;
-use crate::triad::Forward;
+use crate::prior::TriadPrior;
+use crate::quantity::{PerSensor, Sensor};
+use crate::signal::power_ons::PowerOns;
+use crate::triad::{Forward, Triad};
 use crate::warning::Warning;
 
 /// The data of the joint fit.
@@ -38,12 +40,15 @@ pub struct JointFit<'a> {
     pub gyro: Affine<f64>,
     /// Magnitude of gravity, m/s².
     pub gravity: f64,
+    /// The power-ons that the dwells are of.
+    pub power_ons: &'a PowerOns,
+    /// What the population says of the gyro and the accelerometer.
+    pub priors: PerSensor<Option<&'a TriadPrior>>,
 }
 
-impl JointFit<'_> {
-    /// Fits both and returns the accelerometer.
-    pub fn estimate(&self) -> Result<Estimated, Failure> {
-        let singular = || Failure::NoSolution("C is singular".into());
+impl<'a> JointFit<'a> {
+    fn fit(&self) -> Result<FactorFit<'a>, Failure> {
+        let singular = || Failure::NoSolution(SINGULAR.into());
         let centre = Forward::of(&self.accel).ok_or_else(singular)?.bias;
         let at_rest = mean_at_rest(self.rest);
         let mut factors = Factors::of_turns(self.turns);
@@ -54,17 +59,39 @@ impl JointFit<'_> {
         factors.rests(self.rest);
         let accel = Coordinates::triad(Sensor::Accel, &self.accel, &LOWER, &centre, self.gravity);
         let gyro = Coordinates::triad(Sensor::Gyro, &self.gyro, &ALL, &at_rest, 1.0);
+        let mut coordinates = vec![accel, gyro];
+        for sensor in Sensor::BOTH {
+            let steps = factors.bias_steps(sensor, self.power_ons);
+            coordinates.extend(steps.into_iter().map(Coordinates::around_zero));
+            if let Some(prior) = self.priors[sensor] {
+                factors.known(Kind::Population(sensor, prior), None);
+            }
+        }
         let lost = "the fit to the magnitudes and the turns does not converge";
-        let fit = FactorFit::new(factors, vec![accel, gyro], (1e-3, 1), lost);
-        // The first weights: 5 milli-g, half a degree, and the scatter of the dwells.
+        Ok(FactorFit::new(factors, coordinates, (1e-3, 1), lost))
+    }
+
+    fn solved<'b>(&self, fit: &'b FactorFit<'a>) -> Result<Solved<'b>, Failure> {
+        // The first weights: 5 milli-g, half a degree, and the scatter of the dwells. Beside a prior those of the noise, or a prior that does not hold is believed.
+        let beside_prior = self.priors.gyro.or(self.priors.accel).is_some();
         let first = |group, residuals: &[f64]| match group {
+            Observable::Magnitude | Observable::Turns if beside_prior => 0.0,
             Observable::Magnitude => 2.5e-5 * self.gravity * self.gravity,
             Observable::Turns => HALF_DEGREE,
             _ => mean_square(residuals),
         };
-        let solved = fit.solve(fit.start(), &first, &|_| Ok(()))?;
+        fit.solve(fit.start(), &first, &|_| Ok(()))
+    }
+
+    /// Fits both and returns the accelerometer.
+    ///
+    /// # Errors
+    /// No convergence, or a singular result.
+    pub fn estimate(&self) -> Result<Estimated, Failure> {
+        let fit = self.fit()?;
+        let solved = self.solved(&fit)?;
         let parts = solved.parts(Sensor::Accel);
-        let triad = solved.triad(Sensor::Accel, parts, "C is singular")?;
+        let triad = solved.triad(Sensor::Accel, parts, SINGULAR)?;
         if !(triad.inverse.matrix.diagonal().min() > 0.0) {
             return Err(fit.failure());
         }
@@ -78,4 +105,16 @@ impl JointFit<'_> {
             ..Estimated::new(triad, scatter.collect(), condition)
         })
     }
+
+    /// Fits both and returns one.
+    ///
+    /// # Errors
+    /// No convergence, or a singular result.
+    pub fn triad(&self, sensor: Sensor) -> Result<Triad, Failure> {
+        let fit = self.fit()?;
+        let solved = self.solved(&fit)?;
+        solved.triad(sensor, solved.parts(sensor), SINGULAR)
+    }
 }
+
+const SINGULAR: &str = "C is singular";

@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use mimu_core::compensation::Affine;
-use nalgebra::{DMatrix, DVector, Dim, Matrix, Matrix3x2, RawStorage, SMatrix, Vector3};
+use nalgebra::{DMatrix, DVector, Dim, Matrix, Matrix3x2, RawStorage, SMatrix, U12, Vector3};
 
 use crate::observable::Observable;
 use crate::observation::closure::{ClosureError, Closures};
@@ -18,7 +18,8 @@ use crate::observation::magnitude::Magnitude;
 use crate::observation::turn::{Rest, Rotations, Turn, TurnError, Turned};
 use crate::observation::{ByTriad, vector};
 use crate::prior::TriadPrior;
-use crate::quantity::Sensor;
+use crate::quantity::{PerSensor, Sensor};
+use crate::signal::power_ons::PowerOns;
 use crate::triad::{affine, vector as parameters};
 use chains::Chains;
 
@@ -31,6 +32,8 @@ pub enum ParameterBlock {
     LevelRate(usize),
     /// Relative error of a magnitude that is given, such as the rate of a turntable.
     GivenMagnitude(usize),
+    /// By what the bias o of a power-on differs from that of the last one, SI: of a triad, and by so many power-ons before the last.
+    BiasStep(Sensor, usize),
 }
 
 impl ParameterBlock {
@@ -40,9 +43,17 @@ impl ParameterBlock {
             Self::Triad(_) => 12,
             Self::LevelRate(_) => 2,
             Self::GivenMagnitude(_) => 1,
+            Self::BiasStep(..) => 3,
         }
     }
 }
+
+/// Steps of a bias from power-on to power-on, standard deviation, rad/s and m/s²: 1 deg/s, and 10 mg. Data sheets of consumer parts give a tenth to a half of
+/// these. A power-on of one pose, which cannot show its bias, is then of little use and does no harm.
+const BIAS_STEP: PerSensor<f64> = PerSensor {
+    gyro: 0.017,
+    accel: 0.098,
+};
 
 /// Values of blocks, one behind the other.
 #[derive(Debug, Clone)]
@@ -170,6 +181,7 @@ pub struct Factors<'a> {
     turns: Vec<Turn<'a>>,
     rotations: Rotations,
     chains: Chains,
+    power_ons: PowerOns,
     /// Known rate of the Earth about the vertical, rad/s.
     vertical: f64,
 }
@@ -188,6 +200,7 @@ impl<'a> Factors<'a> {
             turns: own,
             rotations: Rotations::new(turns),
             chains,
+            power_ons: PowerOns::default(),
             vertical: 0.0,
         }
     }
@@ -265,6 +278,23 @@ impl<'a> Factors<'a> {
             group,
             dwells: None,
         });
+    }
+
+    /// Adds what is known of the steps of the biases of `sensor` between the power-ons that factors come from; returns their blocks.
+    pub fn bias_steps(&mut self, sensor: Sensor, power_ons: &PowerOns) -> Vec<ParameterBlock> {
+        self.power_ons.clone_from(power_ons);
+        let dwells = self.list.iter().filter_map(|factor| factor.dwells);
+        let seen: Vec<usize> = dwells.map(|of| power_ons.later(of[0])).collect();
+        let steps = (1..=power_ons.others()).filter(|step| seen.contains(step));
+        let blocks: Vec<_> = steps
+            .map(|step| ParameterBlock::BiasStep(sensor, step))
+            .collect();
+        let variance = BIAS_STEP[sensor].powi(2);
+        for block in &blocks {
+            let (none, each) = (DVector::zeros(3), DMatrix::identity(3, 3));
+            self.known(Kind::Stated(*block, none, each, variance), None);
+        }
+        blocks
     }
 
     /// Values with these calibrations, raw to SI, in this order; the Earth's level rates behind them are zero.
@@ -355,6 +385,20 @@ impl Rows<'_> {
         }
     }
 
+    /// Derivatives of all rows by a triad whose bias differs by this `step` from that of the last power-on; 0: by none.
+    fn by_triad<R: Dim, S: RawStorage<f64, R, U12>>(
+        &mut self,
+        sensor: Sensor,
+        step: usize,
+        by: &Matrix<f64, R, U12, S>,
+    ) {
+        self.by(ParameterBlock::Triad(sensor), by);
+        if step > 0 {
+            let block = ParameterBlock::BiasStep(sensor, step);
+            self.by(block, &by.fixed_columns::<3>(9));
+        }
+    }
+
     /// Derivatives of all rows by a block.
     fn by<R: Dim, C: Dim, S: RawStorage<f64, R, C>>(
         &mut self,
@@ -402,8 +446,7 @@ impl<'a> State<'a> {
 
     fn evaluate(&self, factors: &Factors, factor: &Factor, rows: &mut Rows) {
         let model = |sensor| rows.values.triad(sensor).unwrap_or_else(Affine::identity);
-        let of_gyro = ParameterBlock::Triad(Sensor::Gyro);
-        let of_accel = ParameterBlock::Triad(Sensor::Accel);
+        let step = factor.dwells.map_or(0, |of| factors.power_ons.later(of[0]));
         match &factor.kind {
             Kind::Magnitude {
                 sensor,
@@ -414,7 +457,7 @@ impl<'a> State<'a> {
             } => {
                 let found = Magnitude::at(&model(*sensor), raw, *known);
                 rows.residuals(&[found.residual()]);
-                rows.by(ParameterBlock::Triad(*sensor), &found.block.by);
+                rows.by_triad(*sensor, step, &found.block.by);
                 if let Some(given) = given {
                     rows.by(
                         ParameterBlock::GivenMagnitude(*given),
@@ -425,7 +468,7 @@ impl<'a> State<'a> {
             Kind::Rest(rest, chain) => {
                 let found = vector::at(&model(Sensor::Gyro), &rest.raw, &rest.rate);
                 rows.residuals(found.residual.as_slice());
-                rows.by(of_gyro, &found.by);
+                rows.by_triad(Sensor::Gyro, step, &found.by);
                 if let Some((chain, level)) = chain.zip(self.level.get(&rest.dwell)) {
                     rows.by(
                         ParameterBlock::LevelRate(chain),
@@ -436,8 +479,8 @@ impl<'a> State<'a> {
             Kind::Turn(t, chain) => {
                 let (turn, error) = (&self.turns[*t], &self.errors[*t]);
                 rows.residuals(error.block.residual.as_slice());
-                rows.by(of_gyro, &error.block.by);
-                rows.by(of_accel, &stacked(&error.by_accel(&turn.raw)));
+                rows.by_triad(Sensor::Gyro, step, &error.block.by);
+                rows.by_triad(Sensor::Accel, step, &stacked(&error.by_accel(&turn.raw)));
                 if let Some((chain, level)) = chain.zip(self.level.get(&turn.to)) {
                     let by = error.by_level(level, turn.duration_s);
                     rows.by(ParameterBlock::LevelRate(chain), &by);
@@ -448,8 +491,8 @@ impl<'a> State<'a> {
                 if let Some(error) = ClosureError::of(own, turned, factors.vertical) {
                     let raw = [own[0].raw[0], own[own.len() - 1].raw[1]];
                     rows.residuals(error.block.residual.as_slice());
-                    rows.by(of_gyro, &error.block.by);
-                    rows.by(of_accel, &stacked(&[error.by_accel(&raw)]));
+                    rows.by_triad(Sensor::Gyro, step, &error.block.by);
+                    rows.by_triad(Sensor::Accel, step, &stacked(&[error.by_accel(&raw)]));
                 }
             }
             Kind::Stated(block, about, by, _) => {

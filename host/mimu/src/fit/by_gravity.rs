@@ -8,16 +8,16 @@ use super::hold_out::{Refits, Split, determined};
 use super::magnitudes::Magnitudes;
 use super::predicted::{self, Both};
 use super::sensor::{Residual, SensorFit, rms, typical};
-use super::{Options, finish, refuse_wrong_gravity, uncalibrated};
-use crate::estimate::whole_turns::Data;
+use super::{Fit, Options, finish, refuse_wrong_gravity, uncalibrated};
+use crate::estimate::rotation::Data;
 use crate::estimate::with_turns::JointFit;
 use crate::estimate::{Estimated, Failure, Observation, magnitude, rotation};
 use crate::observation::magnitude::Magnitude;
 use crate::observation::turn::{Rest, Turn, TurnError};
 use crate::observation::{place, vector};
 use crate::prepared::Prepared;
-use crate::prior::TriadPrior;
-use crate::quantity::{AXES, Figure, Sensor};
+use crate::prior::{Prior, TriadPrior};
+use crate::quantity::{AXES, Figure, PerSensor, Sensor};
 use crate::signal::blocks::quantile;
 use crate::signal::dwell::Fault;
 use crate::triad::{Covariance, Part, Triad};
@@ -111,6 +111,32 @@ fn prior(prepared: &Prepared, sensor: Sensor) -> Option<TriadPrior> {
     prepared.prior.as_ref()?.triad(sensor)
 }
 
+/// `sensor` as the poses, the turns and the `priors` together have it. Few poses do not contradict what a prior says of the angles between an accelerometer's axes, and
+/// the turns between them do.
+pub(super) fn with_priors(fitted: &Fit, priors: &Prior, sensor: Sensor) -> Option<Triad> {
+    let prepared = &fitted.prepared;
+    let of = |s: Sensor| Some(fitted.sensor(s)?.estimated.triad.inverse);
+    let (gyro, accel) = (of(Sensor::Gyro)?, of(Sensor::Accel)?);
+    let poses = prepared.observations(Sensor::Accel);
+    let priors = Sensor::BOTH.map(|s| priors.triad(s));
+    let [of_gyro, of_accel] = priors.each_ref().map(Option::as_ref);
+    let joint = JointFit {
+        variances: &prepared.magnitude_variances(&accel, &poses),
+        poses: &poses,
+        turns: &prepared.turns(&accel).0,
+        rest: &prepared.rest(&accel),
+        accel,
+        gyro,
+        gravity: prepared.manifest.gravity_mps2,
+        power_ons: &prepared.power_ons,
+        priors: PerSensor {
+            gyro: of_gyro,
+            accel: of_accel,
+        },
+    };
+    joint.triad(sensor).ok()
+}
+
 /// The gyro alone, by whole turns, if the poses do not determine the accelerometer: its readings as delivered give the directions of gravity.
 fn turns_alone(
     prepared: &Prepared,
@@ -162,15 +188,7 @@ fn with_doubt(prepared: &Prepared, fit: &mut SensorFit, accel: &Estimated) {
 pub(super) fn by_turns(prepared: &Prepared, data: &Data) -> Outcome<Estimated> {
     match prepared.whole_turns() {
         Some(stated) => stated.estimate(data),
-        None => rotation::estimate(
-            data.turns,
-            data.rest,
-            data.accel,
-            data.motions,
-            data.start,
-            data.gravity,
-            data.prior,
-        ),
+        None => rotation::estimate(data),
     }
 }
 
@@ -308,6 +326,7 @@ impl ByPoses<'_> {
                 start: None,
                 gravity: self.gravity(),
                 prior: None,
+                power_ons: &prepared.power_ons,
             },
         );
         Some(Guesses {
@@ -357,8 +376,15 @@ impl ByPoses<'_> {
             .filter(|(o, _)| kept(o.dwell))
             .map(|(o, v)| (*o, *v))
             .unzip();
+        let power_ons = &self.prepared.power_ons;
         let Some(Guesses { accel, gyro }) = guesses else {
-            return magnitude::by_gravity(&poses, &variances, self.gravity(), self.prior);
+            return magnitude::by_gravity(
+                &poses,
+                &variances,
+                self.gravity(),
+                self.prior,
+                power_ons,
+            );
         };
         let (turns, _) = self.prepared.turns(accel);
         let turns: Vec<Turn> = turns
@@ -382,6 +408,8 @@ impl ByPoses<'_> {
             accel: *accel,
             gyro: *gyro,
             gravity: self.gravity(),
+            power_ons,
+            priors: PerSensor::default(),
         }
         .estimate()
     }
@@ -451,8 +479,7 @@ fn refits(
                 accel: &accel.triad,
                 motions: &[],
                 start,
-                gravity: data.gravity,
-                prior: data.prior,
+                ..*data
             },
         )?;
         let open = data.turns.iter().filter(|t| of_part(t.to)).map(|t| {
@@ -494,6 +521,7 @@ fn fit_turns(
         motions: &motions,
         start: None,
         gravity: g,
+        power_ons: &prepared.power_ons,
     };
     let gyro = by_turns(prepared, &data).map_err(|f| prepared.refused(f, Sensor::Gyro))?;
     warnings.extend(clipped(prepared, &gyro.triad.inverse));

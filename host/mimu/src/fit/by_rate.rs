@@ -17,6 +17,7 @@ use crate::observation::magnitude::Magnitude;
 use crate::observation::turn::Rest;
 use crate::prepared::{Prepared, si_covariance};
 use crate::quantity::{Figure, Sensor};
+use crate::signal::power_ons::PowerOns;
 use crate::triad::{Triad, vector};
 use crate::turntable::RatedDwells;
 use crate::warning::Warning;
@@ -149,6 +150,7 @@ fn known<'a>(
     rests: &'a [Rest],
 ) -> KnownMagnitudes<'a> {
     KnownMagnitudes {
+        power_ons: PowerOns::ONE,
         prior: None,
         sensor: Sensor::Gyro,
         levels: &dwells.rates,

@@ -10,7 +10,7 @@ use mimu_core::compensation::Affine;
 use nalgebra::Vector3;
 
 use super::by_gravity::{POOR_POSES, by_turns};
-use crate::estimate::whole_turns::Data;
+use crate::estimate::rotation::Data;
 use crate::estimate::{Estimated, Observation, magnitude};
 use crate::factor::Factors;
 use crate::observation::{ALL, LOWER};
@@ -134,8 +134,9 @@ fn fit_poses(prepared: &Prepared, poses: &[Observation]) -> Option<Estimated> {
     let g = prepared.manifest.gravity_mps2;
     let first = magnitude::first_guess(poses, g)?;
     let variances = prepared.magnitude_variances(&first, poses);
+    let power_ons = &prepared.power_ons;
     // By the data alone: a prior that does not hold would make poses outlying.
-    magnitude::by_gravity(poses, &variances, g, None).ok()
+    magnitude::by_gravity(poses, &variances, g, None, power_ons).ok()
 }
 
 fn outlying_poses(prepared: &Prepared, poses: &[Observation], accel: &Affine<f64>) -> Vec<Judged> {
@@ -185,6 +186,7 @@ pub(super) fn turns(prepared: &Prepared) -> Outlying {
         start: None,
         gravity: g,
         prior: None,
+        power_ons: &prepared.power_ons,
     };
     let Ok(gyro) = by_turns(prepared, &data) else {
         return out;

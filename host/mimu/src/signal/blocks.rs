@@ -4,6 +4,8 @@
 //! fourteen million samples that is 85 to 225 MB instead of 1.5 GB. The rails and the thresholds of stillness are only known at the end of
 //! the pass, so a block also carries what is needed to remove clipped samples from its sums later.
 
+use nalgebra::Vector3;
+
 use crate::quantity::Sensor;
 use crate::signal::increment::{Increment, Integrator};
 use crate::signal::jump::Jump;
@@ -133,6 +135,33 @@ pub struct Condensed {
 }
 
 impl Condensed {
+    /// Adds to the gyro's readings between two instants, raw.
+    pub(crate) fn add_to_gyro(&mut self, added: &Vector3<f64>, from_s: f64, to_s: f64) {
+        let own = self.blocks.iter_mut();
+        for block in own.filter(|b| from_s <= b.start_s && b.start_s < to_s) {
+            // Extremes keep their values: they decide on rails, which are those of the recorded reading.
+            let gyro = &mut block.raw[Sensor::Gyro.channels()];
+            gyro.iter_mut().zip(added).for_each(|(m, a)| m.mean += a);
+        }
+        let pieces = self.increments.iter_mut();
+        for piece in pieces.filter(|p| from_s < p.end_s && p.end_s <= to_s) {
+            *piece = piece.with_added(added);
+        }
+    }
+
+    /// The blocks between two instants, without integrals.
+    pub(crate) fn between(&self, from_s: f64, to_s: f64) -> Self {
+        let within = |b: &&Block| from_s <= b.start_s && b.start_s < to_s;
+        Self {
+            blocks: self.blocks.iter().filter(within).cloned().collect(),
+            increments: Vec::new(),
+            warnings: Vec::new(),
+            sha256: String::new(),
+            signed_low_byte: self.signed_low_byte.clone(),
+            ..*self
+        }
+    }
+
     /// Reads `recording` once. `integrate`: also integrate the gyro, as rotations need it. `progress` receives the share that is done.
     pub fn read(recording: &Recording, integrate: bool, progress: impl Fn(f64)) -> Result<Self> {
         let place = recording.place.clone();

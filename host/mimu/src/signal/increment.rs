@@ -1,5 +1,7 @@
 //! The raw gyro, integrated over about 10 ms at a time, before its calibration is known.
 
+use nalgebra::Vector3;
+
 /// Longest time that one [`Increment`] integrates over, s: at 10 rad/s the unit turns by 0.1 rad, and the error of the second-order coning
 /// correction is below 1e-5 rad.
 const INCREMENT_S: f64 = 0.01;
@@ -52,6 +54,16 @@ impl Increment {
         moment: [0.0; 3],
         whole: true,
     };
+
+    /// The same with `added` to all readings, raw.
+    #[must_use]
+    pub(crate) fn with_added(mut self, added: &Vector3<f64>) -> Self {
+        let [a, b, d] = [self.integral, self.coning, self.moment].map(Vector3::from);
+        // A constant rate has no moment.
+        self.integral = (a + added * self.duration_s).into();
+        self.coning = (b + d.cross(added)).into();
+        self
+    }
 }
 
 /// Integrates raw gyro samples to [`Increment`]s.

@@ -583,7 +583,7 @@ fn priors(cases: &mut Cases) {
             (3002, 20, 0.0),
             (3003, 8, 8.0),
         ] {
-            let unit = fleet::unit(seed, stranger).file;
+            let unit = fleet::unit(seed, ([0, 0], stranger)).file;
             let [a, b] = ["a", "b"].map(|name| format!("{name}-{seed}"));
             bench.recorded(&a, &rig::hand_plan(poses), &unit, seed);
             bench.recorded(&b, &rig::hand_plan(12), &unit, seed + 1000);

@@ -198,13 +198,12 @@ impl HighPass {
         }
         for piece in &mut condensed.increments {
             let added = Vector3::from(added(piece.end_s - piece.duration_s));
-            let [a, b, d] = [piece.integral, piece.coning, piece.moment].map(Vector3::from);
-            // The integral of a over the piece, by the definition of d.
+            let [a, d] = [piece.integral, piece.moment].map(Vector3::from);
+            // The integral of a over the piece, by the definition of d. The change of rate that the filter took within 10 ms is of second order.
             let integrated = (d + a * piece.duration_s) * 0.5;
-            let more = added * piece.duration_s + integrated / self.time_constant_s;
-            // A constant rate has no moment; the change of rate that the filter took within 10 ms is of second order.
-            piece.integral = (a + more).into();
-            piece.coning = (b + d.cross(&added)).into();
+            *piece = piece.with_added(&added);
+            piece.integral =
+                (Vector3::from(piece.integral) + integrated / self.time_constant_s).into();
         }
         condensed
     }

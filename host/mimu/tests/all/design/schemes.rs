@@ -9,6 +9,7 @@ use mimu::plan::design::reach::{Fixture, Rates};
 use mimu::plan::design::schemes::{FANG_FILTERS, Scheme};
 use mimu::plan::design::{Problem, lack_of_fit};
 use mimu::quantity::Sensor;
+use mimu::signal::power_ons::PowerOns;
 use mimu_recording::Reference;
 use nalgebra::Vector3;
 
@@ -104,7 +105,7 @@ fn the_estimators_claim_the_sigmas_that_the_design_promised() {
         .triad
         .forward_covariance;
     let variances = vec![sigma * sigma; settings.len()];
-    let size = magnitude::by_gravity(&observations, &variances, GRAVITY, None)
+    let size = magnitude::by_gravity(&observations, &variances, GRAVITY, None, PowerOns::ONE)
         .unwrap()
         .triad;
     for (reference, covariance) in [
