@@ -480,7 +480,10 @@ pub(crate) fn imported(mut args: ImportArgs) -> Result<(ImportSummary, ImportOpt
     bar.finish();
     summary.taken = looked.map_or(Vec::new(), |look| look.words());
     summary.arguments = arguments;
-    summary.warnings.extend(assumed);
+    // A gyro alone measures nothing of it.
+    summary
+        .warnings
+        .extend(assumed.filter(|_| !summary.without_accel));
     summary.warnings.extend(low_rate(&summary));
     Ok((summary, options))
 }

@@ -15,11 +15,11 @@ pub use reference_error::{Cause, Influence};
 mod of_temperature;
 mod off_level;
 mod outlying;
+mod partly;
 pub mod plausible;
 pub(crate) mod predicted;
 mod sensor;
 pub mod session_bias;
-mod six_faces;
 pub(crate) mod uncalibrated;
 
 use std::sync::Arc;
@@ -129,6 +129,9 @@ impl Fit {
         let prior = self.prepared.prior.as_ref();
         if prior.is_some_and(|p| p.table(sensor).is_some()) {
             return match sensor {
+                Sensor::Gyro if self.prepared.manifest.reference == Reference::TurntableRate => {
+                    "magnitude of the rate and a prior"
+                }
                 Sensor::Gyro => "turns, rests and a prior",
                 Sensor::Accel => "magnitude of specific force and a prior",
             };
@@ -185,14 +188,14 @@ pub fn fit(prepared: Prepared, options: Options) -> Result<Fit> {
     Ok(fitted)
 }
 
-/// As [`fit`]. Six faces by hand, which leave the angles between the axes open, give scale factors and biases, with the angles of data sheets.
+/// As [`fit`]. What the recording leaves open stays at the values of data sheets, if these let the rest be fitted: [`partly`].
 ///
 /// # Errors
 /// Those of [`fit`].
 pub fn fit_or_faces(prepared: Prepared, options: Options) -> Result<Fit> {
     match fit(prepared.clone(), options) {
         Err(error @ Error::Undetermined(_)) if prepared.prior.is_none() => {
-            six_faces::fit(prepared, options).ok_or(error)
+            partly::fit(prepared, options).ok_or(error)
         }
         done => done,
     }
@@ -258,7 +261,8 @@ fn fit_as_prepared(mut prepared: Prepared, options: Options) -> Result<Fit> {
         Reference::TurntableRate => Some(RatedDwells::of(&prepared)?),
         Reference::Table | Reference::Gravity => None,
     };
-    let at_none = rated.as_ref().and_then(|r| r.exclude_dwells(&mut prepared));
+    let at_none = rated.iter().flat_map(|r| r.exclude_dwells(&mut prepared));
+    let at_none: Vec<Warning> = at_none.collect();
     let mut warnings = prepared.condensed.warnings.clone();
     warnings.extend(suspicions);
     let others = prepared.power_ons.others();

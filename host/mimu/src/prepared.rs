@@ -240,9 +240,9 @@ impl Prepared {
             );
             return refuse(problem, "use the prior of units that are read alike");
         }
-        if ours.reference != Reference::Gravity || prior.reference != Reference::Gravity {
+        if ours.reference == Reference::Table || ours.reference != prior.reference {
             let problem = format!(
-                "a prior is used where gravity is the only reference, and reference is \"{}\" here and \"{}\" in the prior",
+                "a prior is used where magnitudes are the reference, and of the same one; reference is \"{}\" here and \"{}\" in the prior",
                 ours.reference, prior.reference
             );
             return refuse(problem, "leave the prior out");
@@ -621,7 +621,8 @@ impl Prepared {
                 raw: [a, b].map(|d| d.raw_mean(Sensor::Accel)),
                 direction_variance: (variance(a) + variance(b)) / (g * g),
                 earth_variance: earth.of_direction(duration_s),
-                integral_variance: duration_s * duration_s * rate_variance,
+                integral_variance: duration_s * duration_s * rate_variance
+                    + pieces.iter().map(|i| i.lost_variance).sum::<f64>(),
                 duration_s,
             });
         }

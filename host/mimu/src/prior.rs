@@ -294,6 +294,18 @@ impl TriadPrior {
         ))
     }
 
+    /// The parameters that the data of a fit with this prior leave open, with their means and standard deviations.
+    pub fn open(&self, fitted: &Triad) -> Vec<(TriadParameter, f64, f64)> {
+        let (_, parts) = fitted.physical_parts();
+        let each = self.of.iter().enumerate().filter_map(|(i, k)| {
+            let variance: f64 = parts.iter().map(|p| p.covariance[(*k, *k)]).sum();
+            let prior = self.covariance[(i, i)];
+            let open = variance > (1.0 - SHOWN) * prior;
+            open.then(|| (TriadParameter::physical()[*k], self.mean[*k], prior.sqrt()))
+        });
+        each.collect()
+    }
+
     /// How far a fit with this prior has moved from the middle.
     pub fn movement(&self, fitted: &Triad) -> Option<Movement> {
         let (values, parts) = fitted.physical_parts();
@@ -339,6 +351,8 @@ impl TriadPrior {
     }
 }
 
+/// Share of a parameter's prior variance that the data have to remove for it to count as calibrated.
+const SHOWN: f64 = 0.5;
 /// Share of a direction's prior variance that the data have to remove for it to count as seen. Few poses may err by more than they show, which matters where data and prior are
 /// about equally certain.
 const SEEN: f64 = 0.8;

@@ -37,6 +37,9 @@ const SCALE_IN_SI: [f64; 2] = [0.5, 2.0];
 /// turned as often at 200 as at 270 deg/s and only 200 is given, either half fits that rate.
 const MOST_AT_NONE: f64 = 0.6;
 
+/// Largest share of the dwells whose given rate may be contradicted.
+const MOST_MISLABELLED: f64 = 0.25;
+
 /// The rate at which a dwell turned.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Class {
@@ -61,6 +64,17 @@ pub struct RatedDwells {
     pub rests: Vec<Rest>,
     /// Indices of the dwells that turned at another rate.
     pub others: Vec<usize>,
+    /// Those of them whose given rate the readings contradict.
+    contradicted: Vec<Contradicted>,
+}
+
+/// A dwell whose reading contradicts its given rate.
+#[derive(Debug, Clone, Copy)]
+struct Contradicted {
+    dwell: usize,
+    label_dps: f64,
+    /// The rate that its reading shows; `None` if it is none of those that occur.
+    found_dps: Option<f64>,
 }
 
 impl RatedDwells {
@@ -85,11 +99,28 @@ impl RatedDwells {
         };
         let given: Vec<Option<Class>> = given.into_iter().map(|dps| dps.map(class)).collect();
         let in_si = prepared.manifest.raw_unit == RawUnit::Si;
-        let classes = match given.iter().copied().collect::<Option<Vec<Class>>>() {
+        let mut classes = match given.iter().copied().collect::<Option<Vec<Class>>>() {
             Some(all) => all,
             None => assigned(&observations, &rates, &given, in_si)
                 .ok_or_else(|| unclear(prepared, &rates))?,
         };
+        let contradicted = contradicted(&observations, &rates, &given, in_si);
+        let contradicted: Vec<Contradicted> = contradicted
+            .into_iter()
+            .map(|(k, found)| {
+                let label = classes[k];
+                classes[k] = Class::Other;
+                let dps = |class| match class {
+                    Class::Rate(rate) => rates[rate].to_degrees(),
+                    Class::Rest | Class::Other => 0.0,
+                };
+                Contradicted {
+                    dwell: observations[k].dwell,
+                    label_dps: dps(label),
+                    found_dps: (found != Class::Other).then(|| dps(found)),
+                }
+            })
+            .collect();
         let (mut turning, mut rate_of) = (Vec::new(), Vec::new());
         let (mut rests, mut others) = (Vec::new(), Vec::new());
         for (o, class) in observations.into_iter().zip(classes) {
@@ -119,6 +150,7 @@ impl RatedDwells {
             rate_of,
             rests,
             others,
+            contradicted,
         })
     }
 
@@ -128,8 +160,8 @@ impl RatedDwells {
     }
 
     /// Excludes the turning dwells for the accelerometer, which senses an unknown centripetal force off the axis, and those at another rate
-    /// for both sensors. Returns the warning about the latter.
-    pub fn exclude_dwells(&self, prepared: &mut Prepared) -> Option<Warning> {
+    /// for both sensors. Returns the warnings about the latter.
+    pub fn exclude_dwells(&self, prepared: &mut Prepared) -> Vec<Warning> {
         let turning = self.turning.iter().map(|o| o.dwell);
         for dwell in turning.chain(self.others.iter().copied()) {
             let dwell = &mut prepared.dwells.list[dwell];
@@ -138,14 +170,27 @@ impl RatedDwells {
         for dwell in &self.others {
             prepared.dwells.list[*dwell].faults.gyro = Some(Fault::OtherRate);
         }
-        let step = |dwell: &usize| prepared.dwells.list[*dwell].step;
-        let steps = self.others.iter().map(step);
-        let names: Vec<String> = steps.map(|s| prepared.manifest.step_name(s)).collect();
-        (!names.is_empty()).then_some(Warning::DwellsNotUsed {
-            dwells: names,
-            fault: Fault::OtherRate,
-            sensor: None,
-        })
+        let name = |dwell: usize| {
+            let step = prepared.dwells.list[dwell].step;
+            prepared.manifest.step_name(step)
+        };
+        let by_label = self.contradicted.iter().map(|c| Warning::RateOfDwell {
+            dwell: name(c.dwell),
+            label_dps: c.label_dps,
+            found_dps: c.found_dps,
+        });
+        let mut warnings: Vec<Warning> = by_label.collect();
+        let named = |dwell: &usize| self.contradicted.iter().any(|c| c.dwell == *dwell);
+        let rest = self.others.iter().filter(|dwell| !named(dwell));
+        let dwells: Vec<String> = rest.map(|dwell| name(*dwell)).collect();
+        if !dwells.is_empty() {
+            warnings.push(Warning::DwellsNotUsed {
+                dwells,
+                fault: Fault::OtherRate,
+                sensor: None,
+            });
+        }
+        warnings
     }
 
     /// Refuses a dwell whose rate in a fit of all dwells differs from its given rate; `fitted` are the fitted magnitudes, rad/s.
@@ -290,6 +335,28 @@ fn assigned(
     }
     let (cost, classes) = best?;
     (cost < UNLIKE * n).then_some(classes)
+}
+
+/// The observations whose `given` rate the readings contradict, and what these show. None if more than [`MOST_MISLABELLED`] do: then the rates are wrong.
+fn contradicted(
+    observations: &[Observation],
+    rates: &[f64],
+    given: &[Option<Class>],
+    in_si: bool,
+) -> Vec<(usize, Class)> {
+    let open = vec![None; given.len()];
+    let labelled = given.iter().flatten().count();
+    if labelled == 0 {
+        return Vec::new();
+    }
+    let seen = assigned(observations, rates, &open, in_si).unwrap_or_default();
+    let each = given.iter().zip(seen).enumerate();
+    let other = each.filter(|(_, (given, seen))| given.is_some_and(|given| given != *seen));
+    let other: Vec<_> = other.map(|(k, (_, seen))| (k, seen)).collect();
+    match other.len() as f64 <= MOST_MISLABELLED * labelled as f64 {
+        true => other,
+        false => Vec::new(),
+    }
 }
 
 #[cfg(test)]

@@ -62,9 +62,12 @@ pub enum Warning {
         off_percent: f64,
         manifest_hz: f64,
     },
-    /// Standard deviation of angles between axes that are taken from data sheets, rad.
-    #[error("the poses are faces and say nothing of the angles between the axes: these are taken as 0 ± {:.1} deg, as data sheets have them; hold it with edges and corners up, too", 1.96 * .sigma.to_degrees())]
-    AxesOfDataSheet { sigma: f64 },
+    /// Parameters that stay at the default of data sheets, with that value, and what would show them.
+    #[error("not calibrated, because nothing here shows it: {}; each stays at the default of data sheets, with their limits as its interval; {add}", .parameters.join(", "))]
+    LeftOpen {
+        parameters: Vec<String>,
+        add: &'static str,
+    },
     /// The accelerometer's angles are those of data sheets.
     #[error(
         "not calibrated: its turns depend on the angles between the accelerometer's axes, which the poses leave open"
@@ -86,7 +89,7 @@ pub enum Warning {
     #[error("its white noise of {} deg/s/sqrt(Hz) exceeds that of any gyro: check whether the readings are in deg/s, and the calibration belongs to this unit", degrees(*.white))]
     NoisierThanGyros { white: f64 },
     /// Gaps, the missing time in all, s, and the first data row after one.
-    #[error("{}, {missing_s:.3} s missing in all, the first before data row {row}: turns are not integrated across longer ones than 25 ms, or than one lost sample", plural(*.count, "gap"))]
+    #[error("{}, {missing_s:.3} s missing in all, the first before data row {row}: turns are not integrated across longer ones than 135 ms", plural(*.count, "gap"))]
     Gaps {
         count: u64,
         missing_s: f64,
@@ -107,6 +110,13 @@ pub enum Warning {
     /// Dwells that are poses of the accelerometer but not rests of the gyro.
     #[error("{} ({}) used as a pose only, not as a rest of the gyro: neither its bias in the other dwells nor g-sensitivity explains its reading; the unit probably turned slowly about the vertical", plural(.dwells.len() as u64, "dwell"), .dwells.join(", "))]
     SlowTurns { dwells: Vec<String> },
+    /// A dwell whose reading contradicts the rate that it is given, and the rate that it shows, deg/s.
+    #[error("dwell {dwell} is not used: its given rate is {} deg/s, and its reading shows {}", significant(*label_dps), found_dps.map_or_else(|| "none of the rates".to_owned(), |dps| match dps > 0.0 { true => format!("{} deg/s", significant(dps)), false => "a rest".into() }))]
+    RateOfDwell {
+        dwell: String,
+        label_dps: f64,
+        found_dps: Option<f64>,
+    },
     /// Dwells that are not used, and why: for both sensors alike or for one.
     #[error(fmt = words::dwells_not_used)]
     DwellsNotUsed {
@@ -244,6 +254,16 @@ pub enum Warning {
         turns: f64,
         off: f64,
     },
+    /// Turns one way about an axis of the gyro that read more than those the other way: the difference from their mean and its half-width, rad for each turn.
+    #[error("{axis}: a turn of 360 deg forwards is read as {:.2}, one backwards as {:.2} ± {} deg: the gyro is asymmetric, which no scale factor describes; mimu diagnose names the effect", 360.0 + .per_turn.to_degrees(), 360.0 - .per_turn.to_degrees(), significant(.half.to_degrees()))]
+    AsymmetricTurns {
+        axis: &'static str,
+        per_turn: f64,
+        half: f64,
+    },
+    /// The whole turns together contradict the turns between rests: rms of their errors by the latter, rad, and the probability of that.
+    #[error("by the turns between rests, the whole turns end {} deg rms from where they began, which has a probability of {chance:.0e}: the unit was put back elsewhere each time, or the poses are wrong", significant(.off.to_degrees()))]
+    WholeTurnsContradict { off: f64, chance: f64 },
     /// Whole turns whose error exceeds the stated placement: the error, rad, and the same in sigmas.
     #[error("the whole turns from dwell {from} to {to} are not used: they end {} deg from where the others predict, {sigmas:.0} sigma; repeat them, and put the unit back as it lay", significant(.off.to_degrees()))]
     WholeTurnLeftOut {

@@ -8,7 +8,11 @@ pub fn rounded(value: f64, digits: usize) -> f64 {
 
 /// `value` to three significant digits, without an exponent where that reads well.
 pub fn significant(value: f64) -> String {
-    if value == 0.0 || !value.is_finite() {
+    // Zero has no sign for people.
+    if value == 0.0 {
+        return "0".into();
+    }
+    if !value.is_finite() {
         return format!("{value}");
     }
     // Rounded first: otherwise 0.0099998, which time stamps make of 0.01, would have one digit more. Whole numbers keep all their digits.

@@ -30,6 +30,14 @@ const RATES: [(&str, f64); 3] = [
     ("deg/s", std::f64::consts::PI / 180.0),
     ("mdeg/s", std::f64::consts::PI / 180_000.0),
 ];
+/// Share of a recording in which a unit rests at least. Of one that is turned ten times about each axis it is a sixth.
+const RESTS: f64 = 0.03;
+/// Counts for 1 deg/s of common gyros of 16 bits: TDK, Bosch and Analog Devices have 131 and its halves, ST 1 over 4.375 mdeg/s and its halves, the ITG-3200 14.375.
+const SENSITIVITIES: [f64; 13] = [
+    262.4, 228.6, 131.0, 114.3, 65.5, 57.14, 32.8, 28.57, 16.4, 14.375, 14.29, 8.2, 7.14,
+];
+/// Largest error of the counts for 1 deg/s by the turns of gravity, as a share: it took 65.5 for 59.8.
+const ROUGHLY: f64 = 0.12;
 /// Readings of a converter.
 const COUNTS: &str = "count";
 
@@ -68,10 +76,14 @@ fn norm(v: &[f64; 3]) -> f64 {
     v.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
-fn median(mut values: Vec<f64>) -> Option<f64> {
+fn median(values: Vec<f64>) -> Option<f64> {
+    quantile(values, 0.5)
+}
+
+fn quantile(mut values: Vec<f64>, share: f64) -> Option<f64> {
     values.retain(|v| v.is_finite());
-    let middle = values.len() / 2;
-    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
+    let at = (share * values.len() as f64) as usize;
+    (!values.is_empty()).then(|| *values.select_nth_unstable_by(at, f64::total_cmp).1)
 }
 
 fn is_whole(series: &Series) -> bool {
@@ -135,11 +147,11 @@ fn of_size(accel: &Series, size: Option<f64>, named: Option<&'static str>) -> Un
 /// Unit of a gyro, by the turns of gravity in the readings of the accelerometer if there are any; `named`: the unit in the names of its columns.
 pub fn gyro_unit(gyro: &Series, accel: &Series, named: Option<&'static str>) -> UnitFound {
     let whole = is_whole(gyro);
-    let usual = median(gyro.readings.iter().map(norm).collect());
-    let Some(usual) = usual else {
+    let rest = quantile(gyro.readings.iter().map(norm).collect(), RESTS);
+    let Some(rest) = rest else {
         return UnitFound::new(named, "there are no readings".into());
     };
-    let may_rest = |per: f64| usual * per < LARGEST_BIAS;
+    let may_rest = |per: f64| rest * per < LARGEST_BIAS;
     let ratio = rad_per_reading(gyro, accel);
     let by_turns = ratio.and_then(|ratio| {
         let fits = |per: &f64| (TURNS_WITHIN.recip()..TURNS_WITHIN).contains(&(ratio / per));
@@ -162,8 +174,15 @@ pub fn gyro_unit(gyro: &Series, accel: &Series, named: Option<&'static str>) -> 
         (None, Some(ratio)) => {
             if whole && named.is_none() {
                 let per_dps = 1f64.to_radians() / ratio;
+                let near = SENSITIVITIES.into_iter();
+                let near = near.filter(|per| (per / per_dps - 1.0).abs() < ROUGHLY);
+                let near: Vec<String> = near.map(|per| per.to_string()).collect();
+                let data_sheets = match near.is_empty() {
+                    true => String::new(),
+                    false => format!("; data sheets have {}", near.join(" and ")),
+                };
                 let reason = format!(
-                    "whole numbers, about {} for 1 deg/s by its turns",
+                    "whole numbers, about {} for 1 deg/s by its turns{data_sheets}",
                     shown(per_dps)
                 );
                 return UnitFound::new(Some(COUNTS), reason);
@@ -181,14 +200,14 @@ pub fn gyro_unit(gyro: &Series, accel: &Series, named: Option<&'static str>) -> 
             };
             UnitFound::new(whole.then_some(COUNTS), reason)
         }
-        (None, None) => at_rest(whole, usual, named),
+        (None, None) => at_rest(whole, rest, named),
     }
 }
 
-/// Unit of a gyro whose readings show no turn; `usual`: their median magnitude.
-fn at_rest(whole: bool, usual: f64, named: Option<&'static str>) -> UnitFound {
+/// Unit of a gyro whose readings show no turn; `rest`: the magnitude that they have or exceed but for [`RESTS`] of them.
+fn at_rest(whole: bool, rest: f64, named: Option<&'static str>) -> UnitFound {
     let per = |unit: &str| RATES.iter().find(|(name, _)| *name == unit);
-    let plausible = |unit: &&str| per(unit).is_some_and(|(_, per)| usual * per < LARGEST_BIAS);
+    let plausible = |unit: &&str| per(unit).is_some_and(|(_, per)| rest * per < LARGEST_BIAS);
     match named {
         Some(unit) if plausible(&unit) => {
             UnitFound::new(Some(unit), "by the names alone: no turn shows it".into())
@@ -196,8 +215,8 @@ fn at_rest(whole: bool, usual: f64, named: Option<&'static str>) -> UnitFound {
         Some(unit) => UnitFound::new(
             whole.then_some(COUNTS),
             format!(
-                "the gyro usually reads {}, too much for a bias in {unit}, the unit in the names",
-                shown(usual)
+                "the gyro always reads about {} or more, too much for a bias in {unit}, the unit in the names",
+                shown(rest)
             ),
         ),
         None if whole => UnitFound::new(Some(COUNTS), "its readings are whole numbers".into()),

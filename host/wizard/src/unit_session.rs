@@ -345,7 +345,7 @@ impl UnitSession {
         match &mut self.dwell {
             Some(dwell) => dwell.missing += missing,
             // A turn is integrated across shorter gaps.
-            None if is_bridged((missing + 1) as f64 / rate_hz, 1.0 / rate_hz) => {}
+            None if is_bridged((missing + 1) as f64 / rate_hz) => {}
             None => self.turn_missing += missing,
         }
         if chunk.saturated {

@@ -69,11 +69,16 @@ pub(super) fn whole_turns(turned: &WholeTurnsOfAxis) -> String {
     };
     let before = turned.before_deg_per_turn();
     let before = before.map(|before| format!(" ({:.2} {how})", 360.0 + before));
+    let each_way = turned.asymmetric().map(|ways| {
+        let [forwards, backwards] = ways.map(|[error, half]| plus_minus(360.0 + error, half));
+        format!("; forwards {forwards}, backwards {backwards} deg")
+    });
     format!(
-        "360 deg about {axis} read as {} deg{}: {turns} turns, put back {}",
+        "360 deg about {axis} read as {} deg{}: {turns} turns, put back {}{}",
         plus_minus(360.0 + error, *half),
         before.unwrap_or_default(),
-        plural(*times as u64, "time")
+        plural(*times as u64, "time"),
+        each_way.unwrap_or_default()
     )
 }
 

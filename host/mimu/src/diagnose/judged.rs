@@ -41,16 +41,16 @@ impl Diagnosis {
         } else {
             decision.rms[1]
         };
-        let floor = decision.noise_floor.hypot(decision.reference_rms);
+        // What is predicted of the errors is the same with the effects as without.
         let test = |test: Test| Test {
-            ratio: error / floor,
+            ratio: test.ratio * error / of_fit.error,
             limit: test.limit.max(WANDERS),
             ..test
         };
         Some(ErrorFigures {
             error,
             unseen: held_out.is_finite(),
-            test: of_fit.test.map(test).filter(|_| floor > 0.0),
+            test: of_fit.test.map(test).filter(|_| of_fit.error > 0.0),
             ..of_fit
         })
     }

@@ -6,7 +6,8 @@
 use std::f64::consts::TAU;
 
 use mimu_core::compensation::Affine;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::least_squares::POORLY_DETERMINED;
 use super::rotation::{self, Data, from, guess, mean_at_rest};
@@ -14,6 +15,7 @@ use super::{Estimated, Failure};
 use crate::observation::ByTriad;
 use crate::observation::closure::{Closure, ClosureError, Closures};
 use crate::observation::turn::{Path, Turn};
+use crate::quantity::AXES;
 use crate::warning::Warning;
 
 /// Fewest turns of a whole turn: less is a turn from pose to pose.
@@ -39,6 +41,12 @@ const SCALED: f64 = 0.1;
 const CLOSED: usize = 3;
 /// Ratio of an error to its sigma from which a whole turn is left out.
 const OUTLYING: f64 = 5.0;
+/// Cosine of the largest angle between the axis of a whole turn and that of the unit that it counts for: 25 degrees.
+pub(crate) const NEAR_AXIS: f64 = 0.9;
+/// Least asymmetry, as an angle after one of the turns, in half-widths of the placement of a pair of turns one way and the other.
+const ASYMMETRIC: f64 = 3.0;
+/// Probability from which on the whole turns contradict the turns between rests.
+const CONTRADICTED: f64 = 1e-4;
 
 /// What is stated of the whole turns in a recording.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -80,15 +88,7 @@ impl Stated {
         gyro: &Affine<f64>,
         sigma: &dyn Fn(&Path, &ByTriad) -> f64,
     ) -> Found {
-        let mut found = Found {
-            closures: Closures {
-                list: Vec::new(),
-                placement_variance: (self.placement / 1.96).powi(2),
-                vertical: self.vertical,
-                delivered: None,
-            },
-            warnings: Vec::new(),
-        };
+        let (mut all, mut warnings) = (Vec::new(), Vec::new());
         let mut at = 0;
         while at < turns.len() {
             let longest = (turns.len() - at).min(MOST_PARTS);
@@ -96,18 +96,98 @@ impl Stated {
             let whole = (1..=longest).find_map(|parts| of(parts)?.ok());
             at = match whole {
                 Some(closure) => {
-                    found.warnings.extend(self.miscounted(turns, &closure));
+                    warnings.extend(self.miscounted(turns, &closure));
                     let after = closure.turns.end;
-                    found.closures.list.push(closure);
+                    all.push((closure, None));
                     after
                 }
                 None => {
-                    found.warnings.extend(of(1).and_then(Result::err));
+                    all.extend(of(1).and_then(Result::err).map(|(c, why)| (c, Some(why))));
                     at + 1
                 }
             };
         }
-        found
+        warnings.extend(self.asymmetric(turns, gyro, sigma, &mut all));
+        let mut list = Vec::new();
+        for (closure, refused) in all {
+            match refused {
+                None => list.push(closure),
+                Some(why) => warnings.push(why),
+            }
+        }
+        Found {
+            closures: Closures {
+                list,
+                placement_variance: (self.placement / 1.96).powi(2),
+                vertical: self.vertical,
+                delivered: None,
+            },
+            warnings,
+        }
+    }
+
+    /// Explains the whole turns about an axis of the unit that end off because the gyro reads more for a turn one way than for one the other: no bias does that,
+    /// because the rests show it, and somebody who puts the unit back badly errs alike both ways or at random. They are then used.
+    fn asymmetric(
+        &self,
+        turns: &[Turn],
+        gyro: &Affine<f64>,
+        sigma: &dyn Fn(&Path, &ByTriad) -> f64,
+        all: &mut [(Closure, Option<Warning>)],
+    ) -> Vec<Warning> {
+        let mut warnings = Vec::new();
+        for axis in 0..3 {
+            let about = all
+                .iter()
+                .enumerate()
+                .filter_map(|(k, (closure, refused))| {
+                    let counted = !matches!(refused, Some(Warning::WholeTurnsOpen { .. }));
+                    let part = closure.path.axis[axis];
+                    let own = &turns[closure.turns.clone()];
+                    let (part_of_axis, error) = closure.about_axis(own, gyro, self.vertical[0])?;
+                    let whole = closure.path.turns().round();
+                    let limit = PUT_BACK * self.placement
+                        + 3.0 * sigma(&closure.path, &error.block.by(0)) / part_of_axis.abs();
+                    let over = error.block.residual[0] / part_of_axis;
+                    (counted && part.abs() >= NEAR_AXIS).then_some((
+                        k,
+                        part.signum(),
+                        whole,
+                        (part_of_axis, over, limit),
+                    ))
+                });
+            let about: Vec<_> = about.collect();
+            let each_way = [1.0, -1.0].map(|way| {
+                let own = about.iter().filter(|t| t.1 == way);
+                let count = own.clone().count() as f64;
+                let per_turn = own.map(|t| t.3.1 / t.2).sum::<f64>() / count;
+                (count, per_turn)
+            });
+            let pairs = each_way[0].0.min(each_way[1].0);
+            if pairs < 1.0 {
+                continue;
+            }
+            let per_turn = 0.5 * (each_way[0].1 - each_way[1].1);
+            let fewest = about.iter().map(|t| t.2).fold(f64::INFINITY, f64::min);
+            let half = self.placement / (fewest * (2.0 * pairs).sqrt());
+            let explained = |t: &(usize, f64, f64, (f64, f64, f64))| {
+                (t.3.1 - t.1 * t.2 * per_turn).abs() < t.3.2
+            };
+            let shows = per_turn.abs() > ASYMMETRIC * 2f64.sqrt() * half;
+            if !(shows && about.iter().all(explained)) {
+                continue;
+            }
+            for (k, way, whole, (part, ..)) in &about {
+                all[*k].0.asymmetry = way * whole * per_turn * part;
+                all[*k].1 = None;
+            }
+            warnings.push(Warning::AsymmetricTurns {
+                axis: AXES[axis],
+                per_turn,
+                half,
+            });
+        }
+        warnings
     }
 
     /// Whether these neighbouring turns are whole: `None` if they are turns from pose to pose, the reason if they look whole and cannot be used.
@@ -117,7 +197,7 @@ impl Stated {
         range: std::ops::Range<usize>,
         gyro: &Affine<f64>,
         sigma: &dyn Fn(&Path, &ByTriad) -> f64,
-    ) -> Option<Result<Closure, Warning>> {
+    ) -> Option<Result<Closure, (Closure, Warning)>> {
         let turns = &all[range.clone()];
         let (first, last) = (turns.first()?, turns.last()?);
         let path = Path::of(turns, gyro);
@@ -129,20 +209,28 @@ impl Stated {
         }
         let ended = self.ended(turns, gyro, &|by| sigma(&path, by))?;
         let [from, to] = [first.steps[0], last.steps[1]];
+        let closure = Closure {
+            turns: range,
+            path,
+            asymmetry: 0.0,
+        };
+        let turns = path.turns();
         match ended {
-            Ended::Whole => Some(Ok(Closure { turns: range, path })),
+            Ended::Whole => Some(Ok(closure)),
             Ended::Open(tilt) => {
-                let turns = path.turns();
                 let open = Warning::WholeTurnsOpen { from, to, turns };
-                (tilt < PUT_BACK * self.placement).then_some(Err(open))
+                (tilt < PUT_BACK * self.placement).then_some(Err((closure, open)))
             }
             // A turn of less than one and a half from pose to pose is no mistake.
-            Ended::Off(off) => (path.turns() > 1.5).then_some(Err(Warning::NotPutBack {
-                from,
-                to,
-                turns: path.turns(),
-                off,
-            })),
+            Ended::Off(off) => (turns > 1.5).then(|| {
+                let off = Warning::NotPutBack {
+                    from,
+                    to,
+                    turns,
+                    off,
+                };
+                Err((closure, off))
+            }),
         }
     }
 
@@ -233,6 +321,12 @@ impl Stated {
             found.closures.list.remove(worst);
             found.warnings.push(warning);
             done = from(data, &matrix, &found.closures)?;
+        }
+        if let Some(Ok(base)) = base
+            && base.condition < POORLY_DETERMINED
+        {
+            let contradicted = contradicted(turns, &base, &done, &found.closures);
+            found.warnings.extend(contradicted);
         }
         done.notes.extend(found.warnings);
         Ok(done)
@@ -335,8 +429,7 @@ fn outlying(turns: &[Turn], done: &Estimated, closures: &Closures) -> Option<(us
     let c2 = gyro.matrix.norm_squared() / 3.0;
     let errors = closures.list.iter().map(|closure| {
         let own = &turns[closure.turns.clone()];
-        let error = ClosureError::at(own, gyro, closures.vertical[0]);
-        let error = error.map_or(0.0, |e| e.block.residual[0]);
+        let error = closure.unexplained(own, gyro, closures.vertical[0]);
         (error, error * error / closures.variance(own, c2))
     });
     let errors: Vec<(f64, f64)> = errors.collect();
@@ -355,4 +448,40 @@ fn outlying(turns: &[Turn], done: &Estimated, closures: &Closures) -> Option<(us
         };
         (worst, warning)
     })
+}
+
+/// A warning if the whole turns contradict `base`, the gyro by the turns between rests: a person who always stops short of where the unit lay changes all scale
+/// factors alike, and no whole turn contradicts another.
+fn contradicted(
+    turns: &[Turn],
+    base: &Estimated,
+    done: &Estimated,
+    closures: &Closures,
+) -> Option<Warning> {
+    let (list, vertical) = (&closures.list, closures.vertical[0]);
+    let own = |closure: &Closure| &turns[closure.turns.clone()];
+    let by = |gyro: &Affine<f64>| -> Vec<f64> {
+        let each = list.iter();
+        each.map(|c| c.unexplained(own(c), gyro, vertical))
+            .collect()
+    };
+    let [before, after] = [base, done].map(|of| by(&of.triad.inverse));
+    let c2 = done.triad.inverse.matrix.norm_squared() / 3.0;
+    let known = list.iter().map(|c| closures.variance(own(c), c2));
+    let known = DVector::from_iterator(list.len(), known);
+    let squares = after.iter().zip(&known).map(|(error, v)| error * error / v);
+    let scatter = (squares.sum::<f64>() / list.len() as f64).max(1.0);
+    let errors = list.iter().map(|c| {
+        let error = ClosureError::at(own(c), &base.triad.inverse, vertical)?;
+        Some(error.block.by(0))
+    });
+    let errors = errors.collect::<Option<Vec<_>>>()?;
+    let by = DMatrix::from_fn(list.len(), 12, |i, k| errors[i][k]);
+    let covariance = &by * base.triad.inverse_covariance * by.transpose()
+        + DMatrix::from_diagonal(&(known * scatter));
+    let before = DVector::from_vec(before);
+    let chi2 = before.dot(&covariance.cholesky()?.solve(&before));
+    let chance = ChiSquared::new(list.len() as f64).ok()?.sf(chi2);
+    let off = (before.norm_squared() / list.len() as f64).sqrt();
+    (chance < CONTRADICTED).then_some(Warning::WholeTurnsContradict { off, chance })
 }

@@ -13,7 +13,7 @@ use mimu_core::compensation::Affine;
 use nalgebra::{DMatrix, DVector, Dim, Matrix, Matrix3x2, RawStorage, SMatrix, U12, Vector3};
 
 use crate::observable::Observable;
-use crate::observation::closure::{ClosureError, Closures};
+use crate::observation::closure::{Closure, ClosureError, Closures};
 use crate::observation::magnitude::Magnitude;
 use crate::observation::turn::{Rest, Rotations, Turn, TurnError, Turned};
 use crate::observation::{ByTriad, vector};
@@ -142,7 +142,7 @@ pub enum Kind<'a> {
     /// The direction of gravity after a turn, by its number, and its chain.
     Turn(usize, Option<usize>),
     /// The heading after whole turns, which are neighbours, and the variance without the noise of the gyro, rad².
-    Closure(Range<usize>, f64),
+    Closure(Closure, f64),
     /// Sums of a block's parameters that are known beforehand: values, matrix of the sums (a row for each) and variance of each.
     Stated(ParameterBlock, DVector<f64>, DMatrix<f64>, f64),
     /// The population of a triad's kind.
@@ -253,7 +253,7 @@ impl<'a> Factors<'a> {
         for closure in &whole.list {
             let own = &self.turns[closure.turns.clone()];
             let dwells = [own[0].from, own[own.len() - 1].to];
-            let kind = Kind::Closure(closure.turns.clone(), whole.variance(own, 0.0));
+            let kind = Kind::Closure(closure.clone(), whole.variance(own, 0.0));
             self.push(kind, Observable::WholeTurns, dwells);
         }
     }
@@ -351,8 +351,8 @@ impl<'a> Factors<'a> {
                 all.as_slice().to_vec()
             }
             Kind::Turn(t, _) => vec![self.turns[*t].variance(mean); 2],
-            Kind::Closure(turns, known) => {
-                let noise = self.turns[turns.clone()].iter();
+            Kind::Closure(closure, known) => {
+                let noise = self.turns[closure.turns.clone()].iter();
                 vec![known + mean * noise.map(|turn| turn.integral_variance).sum::<f64>()]
             }
             Kind::Stated(_, _, sums, variance) => vec![*variance; sums.nrows()],
@@ -486,11 +486,12 @@ impl<'a> State<'a> {
                     rows.by(ParameterBlock::LevelRate(chain), &by);
                 }
             }
-            Kind::Closure(turns, _) => {
-                let (own, turned) = (&self.turns[turns.clone()], &self.turned[turns.clone()]);
+            Kind::Closure(closure, _) => {
+                let turns = || closure.turns.clone();
+                let (own, turned) = (&self.turns[turns()], &self.turned[turns()]);
                 if let Some(error) = ClosureError::of(own, turned, factors.vertical) {
                     let raw = [own[0].raw[0], own[own.len() - 1].raw[1]];
-                    rows.residuals(error.block.residual.as_slice());
+                    rows.residuals(&[error.block.residual[0] - closure.asymmetry]);
                     rows.by_triad(Sensor::Gyro, step, &error.block.by);
                     rows.by_triad(Sensor::Accel, step, &stacked(&[error.by_accel(&raw)]));
                 }

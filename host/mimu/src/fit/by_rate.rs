@@ -16,6 +16,7 @@ use crate::factor::Factors;
 use crate::observation::magnitude::Magnitude;
 use crate::observation::turn::Rest;
 use crate::prepared::{Prepared, si_covariance};
+use crate::prior::TriadPrior;
 use crate::quantity::{Figure, Sensor};
 use crate::signal::power_ons::PowerOns;
 use crate::triad::{Triad, vector};
@@ -63,7 +64,9 @@ fn fit_gyro(prepared: &Prepared, dwells: &RatedDwells, options: Options) -> Resu
         );
         return Err(prepared.with_steps_as_given(error, Sensor::Gyro));
     }
-    let estimate = |kept: &dyn Fn(usize) -> bool| estimate(dwells, kept);
+    let prior = prepared.prior.as_ref().and_then(|p| p.triad(Sensor::Gyro));
+    let prior = prior.as_ref();
+    let estimate = |kept: &dyn Fn(usize) -> bool| estimate(dwells, prior, kept);
     let rates = |model: &Affine<f64>| -> Vec<f64> {
         let turning = dwells.turning.iter();
         turning.map(|o| model.apply(&o.raw).norm()).collect()
@@ -72,7 +75,7 @@ fn fit_gyro(prepared: &Prepared, dwells: &RatedDwells, options: Options) -> Resu
         Ok(gyro) => gyro,
         Err(failure) => {
             // A fit to a wrong rate need not converge.
-            let known = known(dwells, &dwells.rate_of, &dwells.rests);
+            let known = known(dwells, None, &dwells.rate_of, &dwells.rests);
             if let Failure::NoSolution(_) = failure
                 && let Some(rough) = magnitude::rough(&dwells.turning, &known)
             {
@@ -146,12 +149,13 @@ fn fit_gyro(prepared: &Prepared, dwells: &RatedDwells, options: Options) -> Resu
 /// What is known of dwells with these rates, and of these rests.
 fn known<'a>(
     dwells: &'a RatedDwells,
+    prior: Option<&'a TriadPrior>,
     rate_of: &'a [usize],
     rests: &'a [Rest],
 ) -> KnownMagnitudes<'a> {
     KnownMagnitudes {
         power_ons: PowerOns::ONE,
-        prior: None,
+        prior,
         sensor: Sensor::Gyro,
         levels: &dwells.rates,
         level_sigma: dwells.rate_sigma,
@@ -163,6 +167,7 @@ fn known<'a>(
 /// The gyro by the `kept` dwells.
 fn estimate(
     dwells: &RatedDwells,
+    prior: Option<&TriadPrior>,
     kept: &dyn Fn(usize) -> bool,
 ) -> std::result::Result<Estimated, Failure> {
     let both = dwells.turning.iter().zip(&dwells.rate_of);
@@ -172,7 +177,7 @@ fn estimate(
         .unzip();
     let rests = dwells.rests.iter().filter(|r| kept(r.dwell));
     let rests: Vec<Rest> = rests.copied().collect();
-    let known = known(dwells, &rate_of, &rests);
+    let known = known(dwells, prior, &rate_of, &rests);
     // Noise is in raw units; a sphere through the readings converts it to SI well enough.
     let sphere = magnitude::first_guess(&turning, dwells.rates[0]);
     let rough = sphere.map_or_else(|| vec![0.0; turning.len()], |s| variances(&s, &turning));

@@ -7,10 +7,12 @@ use super::state::Readings;
 use crate::calibration::Calibration;
 use crate::calibration::apply::Compensated;
 use crate::quantity::{PerSensor, Sensor};
-use crate::signal::increment::is_bridged;
 use crate::triad::Forward;
 use mimu_recording::error::Result;
 use mimu_recording::{Batch, Recording};
+
+/// Longest interval in which samples are lost that is followed, s: no variance allows for what the unit did in it.
+const BRIDGED_S: f64 = 0.025;
 
 /// Corner of the filter above which acceleration counts as vibration, Hz. A hand moves a unit below it.
 pub const VIBRATION_HZ: f64 = 10.0;
@@ -114,7 +116,7 @@ impl<B: FnMut(usize, &[Readings]) -> DeadReckoning> Walk<'_, B> {
     /// Follows the segments from `t0` to `t`, which may lie in several of them.
     fn follow_through(&mut self, t0: f64, t: f64, mean: &Readings) {
         let dt = t - t0;
-        let missing = dt > 1.5 * self.period_s && !is_bridged(dt, self.period_s);
+        let missing = dt > 1.5 * self.period_s && dt > BRIDGED_S;
         let mut from = t0;
         while let Some(own) = self.spans.get(self.span) {
             if t <= own.start_s {

@@ -36,13 +36,15 @@ pub fn of_warning(warning: &Warning) -> Option<JudgementKind> {
         | Warning::FewResiduals
         | Warning::PoorlyDetermined { .. }
         | Warning::UnseenPoses { .. }
-        | Warning::AxesOfDataSheet { .. }
+        | Warning::LeftOpen { .. }
         | Warning::SameRecording
         | Warning::NothingToJudge => Some(JudgementKind::Untested),
         Warning::NoBetter {
             undecided: None, ..
         }
         | Warning::Worse { .. }
+        | Warning::AsymmetricTurns { .. }
+        | Warning::WholeTurnsContradict { .. }
         | Warning::Outliers { .. } => Some(JudgementKind::Unexplained),
         _ => None,
     }

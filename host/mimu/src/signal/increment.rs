@@ -6,21 +6,18 @@ use nalgebra::Vector3;
 /// correction is below 1e-5 rad.
 const INCREMENT_S: f64 = 0.01;
 
-/// Longest interval between two samples, s, across which the rate is taken as linear although samples between them are lost: the period of a log
-/// at 40 Hz. Swinging a unit by hand through 90 degrees in half a second (3 rad/s at 1 Hz) errs by at most 0.15 mrad for each such interval; a
-/// turn of 1 rad/s by 0.01 mrad.
-const BRIDGED_S: f64 = 0.025;
-/// The same if a single sample is lost: of a log at 50 Hz, each second one may be. A quarter turn within two seconds then errs by 0.06 mrad.
-const BRIDGED_ONE_S: f64 = 0.045;
+/// Longest interval between two samples, s, across which the rate is taken as linear although samples between them are lost: twelve of a log at 100 Hz. The error
+/// by the curvature of the rate is in the variance of the turn. A turn by hand of 1 rad/s at 1 Hz curves by up to 7 mrad in it, and by 0.05 mrad in 25 ms.
+const BRIDGED_S: f64 = 0.135;
 
-/// Whether a turn is integrated across an interval `dt` in which samples of this period are lost.
-pub fn is_bridged(dt: f64, period_s: f64) -> bool {
-    dt <= BRIDGED_S || dt <= BRIDGED_ONE_S && dt < 2.5 * period_s
+/// Whether a turn is integrated across an interval `dt` in which samples are lost.
+pub fn is_bridged(dt: f64) -> bool {
+    dt <= BRIDGED_S
 }
 
 /// Sample periods for a pause of unknown length, such as a restart of the board: no turn is integrated across it, however short it was.
 pub fn pause_periods(rate_hz: f64) -> u64 {
-    (2.0 * BRIDGED_ONE_S * rate_hz).ceil().max(2.0) as u64
+    (2.0 * BRIDGED_S * rate_hz).ceil().max(2.0) as u64
 }
 
 /// Integral of the raw gyro readings `u` over about 10 ms, from one sample instant to another, in a form that
@@ -40,6 +37,8 @@ pub struct Increment {
     pub coning: [f64; 3],
     /// d = 2 ∫ a(t) dt - T a(T), raw·s².
     pub moment: [f64; 3],
+    /// Variance of the integral by the samples that are lost, raw²·s², mean of the axes.
+    pub lost_variance: f64,
     /// Whether all samples are there and are numbers: false across a gap that is not [bridged](is_bridged).
     pub whole: bool,
 }
@@ -52,6 +51,7 @@ impl Increment {
         integral: [0.0; 3],
         coning: [0.0; 3],
         moment: [0.0; 3],
+        lost_variance: 0.0,
         whole: true,
     };
 
@@ -98,11 +98,16 @@ impl Integrator {
         let (t0, u0) = self.before.replace((t, u))?;
         let dt = t - t0;
         let open = &mut self.open;
-        let lost = gap && !is_bridged(dt, self.period_s);
-        if lost || !u.iter().chain(&u0).all(|x| x.is_finite()) {
+        if gap && !is_bridged(dt) || !u.iter().chain(&u0).all(|x| x.is_finite()) {
             open.whole = false;
         }
         let regular = !gap && (dt - self.period_s).abs() < 0.1 * self.period_s;
+        if gap {
+            // The slope before would lead so far from the straight line: a third of that, times the interval, is what a parabola encloses with it.
+            let slope = |k: usize| self.earlier.map_or(0.0, |e| (u0[k] - e[k]) / self.period_s);
+            let enclosed = [0, 1, 2].map(|k| (u[k] - u0[k] - slope(k) * dt) * dt / 6.0);
+            open.lost_variance += enclosed.iter().map(|e| e * e).sum::<f64>() / 3.0;
+        }
         let earlier = self.earlier.filter(|_| regular);
         self.earlier = regular.then_some(u0);
         // u(s) = u0 + b s + c s² for s from 0 to 1, integrated once and twice, and its coning.

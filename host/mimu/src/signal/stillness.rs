@@ -250,7 +250,7 @@ impl Search<'_> {
         }
         let turntable = Turntable::of(self, &part, &limits);
         let quiet = |w: &Window| match &turntable {
-            Some(turntable) => turntable.is_even(w, &limits, &self.channels),
+            Some(turntable) => turntable.is_even(w, &limits),
             None => self.channels.iter().all(|&c| w.variance[c] <= limits[c]),
         };
         let at_rest: Vec<&Window> = self.windows_in(&part).map(|(_, w)| w).collect();
@@ -277,6 +277,10 @@ impl Search<'_> {
             Reference::Table => 0..0,
         };
         change_point::split(&mut segments, self.condensed, by_level, self.width);
+        if self.by_hand() {
+            let gyro = Sensor::Gyro.channels();
+            change_point::split_at_nudges(&mut segments, self.condensed, gyro, self.width);
+        }
         let trembles = self.trembles(&variance);
         let guarded = segments.into_iter().filter_map(|segment| {
             // At the ends of the recording there is no motion to guard against.
@@ -478,14 +482,13 @@ impl Turntable {
         })
     }
 
-    /// Whether the unit rests or turns evenly. In a turn nothing is expected of an accelerometer.
-    fn is_even(&self, w: &Window, limits: &[f64; 6], channels: &[usize]) -> bool {
+    /// Whether the unit rests or turns evenly, by its gyro: a turn about an axis that is not vertical moves gravity through the axes of the accelerometer.
+    fn is_even(&self, w: &Window, limits: &[f64; 6]) -> bool {
         let rate = Sensor::Gyro.channels().map(|c| w.mean[c] - self.at_rest[c]);
         let wobble = WOBBLE * WOBBLE * rate.map(|r| r * r).sum::<f64>();
-        let gyro = Sensor::Gyro.channels();
-        let turns = gyro.clone().all(|c| wobble > limits[c]);
-        let mut judged = channels.iter().filter(|c| !turns || gyro.contains(*c));
-        judged.all(|&c| w.variance[c] <= limits[c] + wobble * f64::from(u8::from(c < 3)))
+        Sensor::Gyro
+            .channels()
+            .all(|c| w.variance[c] <= limits[c] + wobble)
     }
 }
 

@@ -242,6 +242,7 @@ impl JoinedFiles {
                 preset: options.preset.clone(),
                 sample_rate_hz: files.rate_hz,
                 time: files.time,
+                without_accel: !columns.accel,
                 warnings,
                 ..ImportSummary::default()
             },

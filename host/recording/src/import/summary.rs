@@ -59,6 +59,9 @@ pub struct ImportSummary {
     pub broken_rows: Vec<BrokenRows>,
     /// Raw cells that are empty.
     pub empty_cells: u64,
+    /// Whether no column is of an accelerometer.
+    #[serde(skip)]
+    pub without_accel: bool,
     /// What was read from logs, and whether their own calibration was undone.
     pub notes: Vec<String>,
     /// Warnings, one sentence each.

@@ -68,7 +68,7 @@ pub(super) fn spreads(fleet: &Fleet) -> Table {
 /// All parameters of a triad.
 pub(super) fn population(sensor: Sensor, triad: &TriadOfFleet) -> Table {
     let caption = format!(
-        "{sensor}: {} units, of which {} belong to the population; scale factors relative to the median",
+        "{sensor}: {} units; mean and scatter are of the {} that lie nearest together; scale factors relative to the median",
         triad.units, triad.used
     );
     let heads = [

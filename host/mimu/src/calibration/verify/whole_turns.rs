@@ -8,15 +8,12 @@ use serde::Serialize;
 
 use crate::calibration::Calibration;
 use crate::calibration::verify::nominal;
-use crate::estimate::whole_turns::Stated;
+use crate::estimate::whole_turns::{NEAR_AXIS, Stated};
 use crate::observation::closure::{Closure, ClosureError};
 use crate::observation::turn::{Path, Turn};
 use crate::prepared::Prepared;
 use crate::quantity::{AXES, Sensor};
 use crate::warning::Warning;
-
-/// Whole turns count for an axis if their axis is within 25 degrees of it, cosine.
-const NEAR_AXIS: f64 = 0.9;
 
 /// The whole turns about an axis.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -31,6 +28,9 @@ pub struct WholeTurnsOfAxis {
     pub error_deg_per_turn: f64,
     /// Half-width of the 95 % interval of that, by the stated placement and the noise.
     pub half_width_deg_per_turn: f64,
+    /// The same error of turns forwards and backwards, by the right-hand rule about the axis, and the half-width of each; absent unless it was turned both ways.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub each_way_deg_per_turn: Option<[[f64; 2]; 2]>,
     /// The same error of the readings as they came, with the rate at rest subtracted; absent if they are not in SI.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub uncalibrated_deg_per_turn: Option<f64>,
@@ -40,6 +40,12 @@ pub struct WholeTurnsOfAxis {
 }
 
 impl WholeTurnsOfAxis {
+    /// The errors of both ways if they differ by more than their intervals allow.
+    pub fn asymmetric(&self) -> Option<[[f64; 2]; 2]> {
+        let differ = |[a, b]: &[[f64; 2]; 2]| (a[0] - b[0]).abs() > a[1].hypot(b[1]);
+        self.each_way_deg_per_turn.filter(differ)
+    }
+
     /// The error without the calibration of this axis: of the readings as they came, or with one scale factor for all axes.
     pub fn before_deg_per_turn(&self) -> Option<f64> {
         self.uncalibrated_deg_per_turn
@@ -56,6 +62,8 @@ struct Sum {
     variance: f64,
     uncalibrated: f64,
     one_for_all: f64,
+    /// Turns, error and variance forwards and backwards.
+    each_way: [[f64; 3]; 2],
 }
 
 /// The whole turns of `prepared` by its gyro's `calibration`, and what could not be used. Empty unless whole turns are stated.
@@ -102,7 +110,16 @@ pub(super) fn verify(
         sum.times += 1;
         sum.turns += closure.path.turns().round();
         sum.error += error;
-        sum.variance += found.closures.variance(own, c2);
+        let variance = found.closures.variance(own, c2);
+        sum.variance += variance;
+        let backwards = usize::from(closure.path.axis[largest] < 0.0);
+        for (sum, one) in
+            sum.each_way[backwards]
+                .iter_mut()
+                .zip([closure.path.turns().round(), error, variance])
+        {
+            *sum += one;
+        }
         sum.uncalibrated += as_came.as_ref().and_then(read).unwrap_or(f64::NAN);
         sum.one_for_all += one_for_all.as_ref().and_then(read).unwrap_or(f64::NAN);
     }
@@ -110,12 +127,17 @@ pub(super) fn verify(
     let each = names.zip(sums).filter(|(_, sum)| sum.times > 0);
     let each = each.map(|(axis, sum)| {
         let per_turn = |rad: f64| rad.to_degrees() / sum.turns;
+        let each_way = sum.each_way.map(|[turns, error, variance]| {
+            [error, 1.96 * variance.sqrt()].map(|rad| rad.to_degrees() / turns)
+        });
+        let both = axis != "other" && sum.each_way.iter().all(|way| way[0] > 0.0);
         WholeTurnsOfAxis {
             axis,
             times: sum.times,
             turns: sum.turns as u32,
             error_deg_per_turn: per_turn(sum.error),
             half_width_deg_per_turn: per_turn(1.96 * sum.variance.sqrt()),
+            each_way_deg_per_turn: both.then_some(each_way),
             uncalibrated_deg_per_turn: as_came.map(|_| per_turn(sum.uncalibrated)),
             one_for_all_deg_per_turn: one_for_all.map(|_| per_turn(sum.one_for_all)),
         }
