@@ -3,9 +3,11 @@
 use mimu::calibration::Calibration;
 use mimu::calibration::verify::verify;
 use mimu::fit::{Options, fit};
+use mimu::judgement::{Judgement, JudgementKind};
 use mimu::quantity::Sensor;
 use mimu::warning::Warning;
 use mimu_recording::WholeTurns;
+use mimu_rig::rig_file::EffectFile;
 use mimu_tests::by_hand::{Grade, unit};
 use mimu_tests::whole_turns::{Session, case, recorded, scales};
 use rayon::prelude::*;
@@ -167,6 +169,85 @@ fn a_unit_that_is_not_put_back_is_named_and_left_out() {
         assert_eq!(named.len(), 1, "{off}: {named:?}");
         let scales = scales(&fitted, &file, 4, &plan);
         assert!((0..3).all(|k| scales.errors[k].abs() < 5e-4), "{scales:?}");
+    }
+}
+
+/// A gyro whose scale factors differ by half a per cent between the two ways: errors of ten turns of nine degrees.
+#[test]
+fn turns_that_read_more_one_way_are_named_and_used() {
+    let mut file = unit(&[], Grade::Consumer, 8);
+    let size = vec![toml::Value::Float(0.75); 3];
+    file.effect.push(EffectFile {
+        id: "gyro_scale_asymmetry".into(),
+        parameters: toml::Table::from_iter([("dps_at_300dps".to_owned(), size.into())]),
+    });
+    let plan = Session::POSES_AND_TURNS.plan();
+    let stated = Some(WholeTurns::default());
+    let made = recorded(&file, &plan, 8, stated);
+    let fitted = fit(made.clone(), Options::IN_SAMPLE).unwrap();
+    assert_eq!(Judgement::of_fit(&fitted).kind, JudgementKind::Unexplained);
+    let told: Vec<String> = fitted.all_warnings().map(ToString::to_string).collect();
+    let asymmetric = told.iter().filter(|w| w.contains("is asymmetric"));
+    assert_eq!(asymmetric.count(), 3, "{told:?}");
+    let scales = scales(&fitted, &file, 8, &plan);
+    for (error, half) in scales.errors.iter().zip(scales.half_widths) {
+        assert!(error.abs() < 1.5 * half && half < 5e-4, "{error} {half}");
+    }
+    let calibration = Calibration::of(&fitted, &[], "2026-01-02T03:04:05Z").unwrap();
+    for axis in &verify(&made, &calibration).unwrap().whole_turns {
+        let ways = axis.asymmetric().expect("turned both ways");
+        for ([error, half], truth) in ways.iter().zip([0.9, -0.9]) {
+            assert!(
+                (error - truth).abs() < 1.5 * half && *half < 0.15,
+                "{ways:?}"
+            );
+        }
+    }
+}
+
+/// Nine samples in every fifteen seconds.
+#[test]
+fn samples_that_are_lost_while_it_turns_widen_the_intervals_and_refuse_nothing() {
+    let inside = (30..40).into_par_iter().map(|seed| {
+        let mut file = unit(&[], Grade::Consumer, seed);
+        (file.flaws.pause_after, file.flaws.pause_s) = (3000, 0.045);
+        let plan = Session::POSES_AND_TURNS.plan();
+        let stated = Some(WholeTurns::default());
+        let fitted = fit(recorded(&file, &plan, seed, stated), Options::IN_SAMPLE).unwrap();
+        let refused = |w: &&Warning| matches!(w, Warning::TurnNotUsed { .. });
+        assert_eq!(fitted.warnings.iter().filter(refused).count(), 0, "{seed}");
+        let scales = scales(&fitted, &file, seed, &plan);
+        let widest = scales.half_widths.into_iter().fold(0.0, f64::max);
+        assert!(widest < 5e-4, "{seed}: {widest}");
+        scales.inside
+    });
+    let inside: u32 = inside.sum();
+    println!("{inside} of 120");
+    assert!(inside >= 108, "{inside} of 120");
+}
+
+/// Somebody who stops eleven degrees short each time, with a gyro that is too noisy for a few poses to tell each turn.
+#[test]
+fn turns_that_all_end_short_are_not_taken_for_a_scale_factor() {
+    for seed in 50..58 {
+        let mut file = unit(&[], Grade::Consumer, seed);
+        file.unit.gyro_axes.white_si = Some([0.03f64.to_radians(); 3]);
+        let session = Session {
+            poses: 8,
+            ..Session::POSES_AND_TURNS
+        };
+        let plan = session.plan().replace("turns = 10", "turns = 9.97");
+        let plan = plan.replace("turns = -10", "turns = -9.97");
+        let stated = Some(WholeTurns::default());
+        let Ok(fitted) = fit(recorded(&file, &plan, seed, stated), Options::IN_SAMPLE) else {
+            continue;
+        };
+        let told: Vec<String> = fitted.all_warnings().map(ToString::to_string).collect();
+        let none = told.iter().any(|w| w.contains("no whole turns were found"));
+        let contradicted = told
+            .iter()
+            .any(|w| w.contains("by the turns between rests"));
+        assert!(none || contradicted, "{seed}: {told:?}");
     }
 }
 

@@ -1,10 +1,13 @@
 //! Dwells found in simulated logs that are hard to segment, and faults of logs that rests show.
 
-use mimu::fit::{Options, fit};
+use mimu::fit::{Options, fit, fit_or_faces};
+use mimu::judgement::{Judgement, JudgementKind};
 use mimu::quantity::Sensor;
 use mimu::recording_problem::RecordingProblem;
 use mimu::signal::stillness::STILL_FACTOR;
+use mimu::triad::Angles;
 use mimu::turntable::RatedDwells;
+use mimu::warning::Warning;
 use mimu::{Manifest, Prepared, RawUnit, Reference, Samples};
 use mimu_recording::health::Fault;
 use mimu_recording::{Turntable, TurntableRate};
@@ -382,4 +385,126 @@ fn files_of_a_sequence_hold_many_dwells_each_at_the_rate_of_the_file() {
     let prepared = Prepared::of(manifest, &samples, STILL_FACTOR).unwrap();
     let refused = RatedDwells::of(&prepared).expect_err("no such file");
     assert!(refused.to_string().contains("stand"), "{refused}");
+}
+
+#[test]
+fn a_dwell_that_contradicts_the_rate_of_its_file_is_named_and_left_out() {
+    let (mut samples, scale) = on_a_record_player(4, 16);
+    let rows = samples.t_s.len() / 3;
+    // A rest of four seconds within the file of 45 rpm: it begins the recording.
+    let (end_s, rest) = (samples.t_s[3 * rows - 1], 4 * RATE_HZ as usize);
+    for row in 0..rest {
+        samples.t_s.push(end_s + (row + 1) as f64 / RATE_HZ);
+        samples.raw[..3].iter_mut().for_each(|c| c.push(c[row]));
+    }
+    for (row, t_s) in samples.t_s.iter_mut().enumerate() {
+        let file = (row / rows).min(2);
+        *t_s += 10.0 * file as f64;
+        samples.step.push(file as i32);
+    }
+    let mut manifest = Manifest::new("u", RATE_HZ, G, RawUnit::Si, Reference::TurntableRate);
+    manifest.imported_with = vec!["--sequence".into()];
+    manifest.step_labels = ["rest", "33", "45"].map(String::from).into();
+    let rates = ["rest=0", "33=200", "45=270"].map(|r| r.parse().unwrap());
+    manifest.turntable = Some(Turntable::new(&rates, 1e-4));
+    let prepared = Prepared::of(manifest, &samples, STILL_FACTOR).unwrap();
+    let fit = fit(prepared, Options::default()).unwrap();
+    let named = fit.warnings.iter().map(ToString::to_string);
+    let named: Vec<String> = named.filter(|w| w.contains("its given rate is")).collect();
+    let says = "dwell 45/17 is not used: its given rate is 270 deg/s, and its reading shows a rest";
+    assert_eq!(named, [says]);
+    let found = fit
+        .sensor(Sensor::Gyro)
+        .unwrap()
+        .estimated
+        .triad
+        .forward
+        .matrix;
+    for k in 0..3 {
+        let ratio = found.row(k).norm() / scale.row(k).norm();
+        assert!((ratio - 1.0).abs() < 1e-3, "axis {k}: {ratio}");
+    }
+}
+
+#[test]
+fn a_table_about_one_level_axis_calibrates_that_axis_and_names_what_stays_open() {
+    for seed in 1..=5 {
+        let mut log = Log::new(seed);
+        // The axis z lies level, so that gravity turns through x and y.
+        log.attitude = Rotation3::new(Vector3::new(1.55, 0.02, 0.0));
+        let axis = Vector3::new(0.02, -0.01, -1.0).normalize();
+        let rates = [5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 35.0];
+        for dps in rates {
+            log.rest(10.0);
+            (0..(20.0 * RATE_HZ) as usize)
+                .for_each(|_| log.sample(axis * f64::to_radians(dps), Vector3::zeros()));
+        }
+        log.rest(10.0);
+        let mut manifest = Manifest::new("u", RATE_HZ, G, RawUnit::Count, Reference::TurntableRate);
+        let rates = rates.map(|r| r.to_string().parse::<TurntableRate>().unwrap());
+        manifest.turntable = Some(Turntable::new(&rates, 1e-3));
+        let prepared = Prepared::of(manifest, &log.samples, STILL_FACTOR).unwrap();
+        let fit = fit_or_faces(prepared, Options::default()).unwrap();
+        assert_eq!(Judgement::of_fit(&fit).kind, JudgementKind::Untested);
+        let gyro = fit.sensor(Sensor::Gyro).unwrap();
+        let physical = gyro.estimated.triad.physical(Angles::Exact);
+        let z = physical.scale[2];
+        assert!(
+            (z.value / PER_RATE - 1.0).abs() < z.interval / PER_RATE,
+            "{z:?}"
+        );
+        assert!(z.interval < 2e-3 * PER_RATE, "{z:?}");
+        assert!(physical.scale[0].interval > 0.02 * PER_RATE);
+        for (bias, truth) in physical.bias.iter().zip(BIAS) {
+            assert!(
+                (bias.value - truth).abs() < bias.interval,
+                "{bias:?} {truth}"
+            );
+        }
+        let open = fit.all_warnings().find_map(|w| match w {
+            Warning::Of { warning, .. } => match &**warning {
+                Warning::LeftOpen { parameters, .. } => Some(parameters.join(", ")),
+                _ => None,
+            },
+            _ => None,
+        });
+        let open = open.unwrap();
+        for (name, named) in [("factor x", true), ("factor y", true), ("factor z", false)] {
+            assert_eq!(open.contains(name), named, "{open}");
+        }
+    }
+}
+
+/// A gyro so noisy that a nudge does not show in its variance.
+#[test]
+fn a_nudge_between_two_rests_ends_a_dwell_and_noise_does_not() {
+    for (seed, nudge_deg) in (1..=10).flat_map(|seed| [(seed, 0.0), (seed, 2.0)]) {
+        let mut log = Log::new(seed);
+        log.rest(4.0);
+        for _ in 0..8 {
+            log.turn(1.5, 1.3);
+            log.rest(2.5);
+            let up = log.attitude.inverse() * Vector3::z();
+            let rows = (0.5 * RATE_HZ) as usize;
+            (0..rows).for_each(|i| {
+                let phase = std::f64::consts::TAU * (i as f64 + 0.5) / rows as f64;
+                let rate = f64::to_radians(nudge_deg) / 0.5 * (1.0 - phase.cos());
+                log.sample(up * rate, Vector3::zeros());
+            });
+            log.rest(2.5);
+        }
+        let mut samples = log.samples;
+        let mut noise = Random::new(seed, "a noisy gyro");
+        for column in &mut samples.raw[..3] {
+            column
+                .iter_mut()
+                .for_each(|u| *u += (60.0 * noise.normal()).round());
+        }
+        let found = by_hand(&samples).unwrap().dwells.list.len();
+        assert_eq!(
+            found,
+            if nudge_deg > 0.0 { 17 } else { 9 },
+            "{seed} {nudge_deg}"
+        );
+    }
 }
