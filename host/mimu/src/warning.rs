@@ -9,7 +9,7 @@ use std::mem::discriminant;
 
 use mimu_recording::error::Error;
 use mimu_recording::health::Finding;
-use mimu_recording::{ClockRate, RAW_COLUMNS};
+use mimu_recording::{ClockRate, RAW_COLUMNS, RawUnit};
 use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
 
@@ -67,6 +67,14 @@ pub enum Warning {
     LeftOpen {
         parameters: Vec<String>,
         add: &'static str,
+    },
+    /// An axis that differs between dwells on one face: the difference and the noise of a dwell, in the unit of the readings.
+    #[error("{axis} differs by up to {} {unit} between dwells on one face, and their noise is {} {unit}: its bias has moved, or the unit did not lie on that face", significant(*spread), significant(*noise))]
+    FaceDiffers {
+        axis: &'static str,
+        spread: f64,
+        noise: f64,
+        unit: RawUnit,
     },
     /// The accelerometer's angles are those of data sheets.
     #[error(

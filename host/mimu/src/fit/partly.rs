@@ -12,10 +12,11 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::determined::faces_not_up;
 use super::{Fit, Options, SensorFit, fit_as_prepared, fit_biases};
+use crate::estimate::Observation;
 use crate::parameter::ParameterKind;
 use crate::prepared::Prepared;
 use crate::prior::{Prior, PriorTable};
-use crate::quantity::{PerSensor, Sensor, plus_minus, scale_unit};
+use crate::quantity::{AXES, PerSensor, Sensor, plus_minus, scale_unit};
 use crate::readable;
 use crate::signal::blocks::{extent, quantile};
 use crate::triad::Covariance;
@@ -29,6 +30,8 @@ const ANGLE: f64 = 0.0163;
 const OPEN: f64 = 0.5;
 /// Standard deviation of the scale factor of an axis that nothing turned about: data sheets of consumer parts give 3 % as largest value.
 const SCALE: f64 = 0.015;
+/// Largest share of gravity by which readings on one face may differ: that of a tilt of five degrees.
+const TILT: f64 = 4e-3;
 /// Numbers of scale factors, non-orthogonalities and biases among the physical parameters. The accelerometer's own axes are the body's.
 const FREE: [usize; 9] = [0, 1, 2, 6, 7, 8, 9, 10, 11];
 /// A prior of so many units is a known one.
@@ -137,8 +140,8 @@ fn six_faces(prepared: Prepared, options: Options) -> Option<Fit> {
         return None;
     }
     let gravity = prepared.manifest.gravity_mps2;
-    let raw = prepared.observations(Sensor::Accel);
-    let raw: Vec<Vector3<f64>> = raw.into_iter().map(|o| o.raw).collect();
+    let poses = prepared.observations(Sensor::Accel);
+    let raw: Vec<Vector3<f64>> = poses.iter().map(|o| o.raw).collect();
     let ends = [0, 1, 2].map(|axis| extent(raw.iter().map(|u| u[axis])));
     let scale = ends.map(|[low, high]| 0.5 * (high - low) / gravity);
     let bias = ends.map(|[low, high]| 0.5 * (high + low));
@@ -166,6 +169,18 @@ fn six_faces(prepared: Prepared, options: Options) -> Option<Fit> {
     };
     // The turns between the faces depend on the angles: a gyro fitted to them would err by what these are off.
     let mut found = fit_as_prepared(with, only).ok()?;
+    let unit = prepared.manifest.raw_unit;
+    let differs = differing_face(&poses, &guess).map(|(axis, spread, noise)| {
+        let axis = AXES[axis];
+        Warning::FaceDiffers {
+            axis,
+            spread,
+            noise,
+            unit,
+        }
+        .of(Sensor::Accel)
+    });
+    found.warnings.extend(differs);
     name_open(
         &mut found,
         Sensor::Accel,
@@ -185,6 +200,21 @@ fn six_faces(prepared: Prepared, options: Options) -> Option<Fit> {
         }
     }
     Some(found)
+}
+
+/// The axis that differs most between `poses` on one face, the difference and the noise, if neither that nor a tilt explains it.
+fn differing_face(poses: &[Observation], guess: &Affine<f64>) -> Option<(usize, f64, f64)> {
+    let faces = (0..3).flat_map(|axis| [1.0, -1.0].map(|up| (axis, up)));
+    let each = faces.filter_map(|(axis, up)| {
+        let own = poses.iter();
+        let own = own.filter(|o| up * guess.apply(&o.raw).normalize()[axis] > 0.7);
+        let [low, high] = extent(own.clone().map(|o| o.raw[axis]));
+        let noise = own.map(|o| o.variance[axis]).fold(0.0, f64::max).sqrt();
+        let size = guess.apply(&poses[0].raw).norm() / guess.matrix[(axis, axis)];
+        let spread = high - low;
+        (spread > (TILT * size).max(10.0 * noise)).then_some((axis, spread, noise))
+    });
+    each.max_by(|a, b| a.1.total_cmp(&b.1))
 }
 
 /// The biases of a gyro whose unit is known: five turns between faces are too few for more.

@@ -43,6 +43,7 @@ pub fn of_warning(warning: &Warning) -> Option<JudgementKind> {
             undecided: None, ..
         }
         | Warning::Worse { .. }
+        | Warning::FaceDiffers { .. }
         | Warning::AsymmetricTurns { .. }
         | Warning::WholeTurnsContradict { .. }
         | Warning::Outliers { .. } => Some(JudgementKind::Unexplained),

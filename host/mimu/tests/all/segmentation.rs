@@ -508,3 +508,40 @@ fn a_nudge_between_two_rests_ends_a_dwell_and_noise_does_not() {
         );
     }
 }
+
+#[test]
+fn a_face_that_reads_differently_each_time_is_named() {
+    for moves in [0.0, 100.0] {
+        let mut log = Log::new(7);
+        for dwell in 0..18 {
+            let (x, y, half) = (Vector3::x(), Vector3::y(), std::f64::consts::FRAC_PI_2);
+            let up = [
+                x * 0.0,
+                x * half,
+                x * -half,
+                y * half,
+                y * -half,
+                x * 2.0 * half,
+            ];
+            let tilt = log.unit_vector() * 0.02;
+            log.attitude = Rotation3::new(tilt) * Rotation3::new(up[dwell % 6]);
+            let from = log.samples.t_s.len();
+            log.rest(3.0);
+            let moved = moves * (dwell / 6) as f64;
+            log.samples.raw[5][from..]
+                .iter_mut()
+                .for_each(|u| *u += moved);
+        }
+        log.samples.raw[..3].iter_mut().for_each(Vec::clear);
+        let fit = fit_or_faces(by_hand(&log.samples).unwrap(), Options::default()).unwrap();
+        let told: Vec<String> = fit.all_warnings().map(ToString::to_string).collect();
+        let named = told
+            .iter()
+            .find(|w| w.contains("between dwells on one face"));
+        assert_eq!(named.is_some(), moves > 0.0, "{told:?}");
+        assert!(
+            named.is_none_or(|w| w.starts_with("accel: z differs by up to 2")),
+            "{named:?}"
+        );
+    }
+}
