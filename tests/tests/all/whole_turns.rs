@@ -215,15 +215,16 @@ fn samples_that_are_lost_while_it_turns_widen_the_intervals_and_refuse_nothing()
         let stated = Some(WholeTurns::default());
         let fitted = fit(recorded(&file, &plan, seed, stated), Options::IN_SAMPLE).unwrap();
         let refused = |w: &&Warning| matches!(w, Warning::TurnNotUsed { .. });
-        assert_eq!(fitted.warnings.iter().filter(refused).count(), 0, "{seed}");
+        let refused = fitted.warnings.iter().filter(refused).count();
         let scales = scales(&fitted, &file, seed, &plan);
         let widest = scales.half_widths.into_iter().fold(0.0, f64::max);
-        assert!(widest < 5e-4, "{seed}: {widest}");
-        scales.inside
+        (refused, widest, scales.inside)
     });
-    let inside: u32 = inside.sum();
-    println!("{inside} of 120");
-    assert!(inside >= 108, "{inside} of 120");
+    let all: Vec<(usize, f64, u32)> = inside.collect();
+    println!("{all:?}");
+    assert!(all.iter().all(|one| one.0 == 0), "{all:?}");
+    assert!(all.iter().all(|one| one.1 < 5e-4), "{all:?}");
+    assert!(all.iter().map(|one| one.2).sum::<u32>() >= 108, "{all:?}");
 }
 
 /// Somebody who stops eleven degrees short each time, with a gyro that is too noisy for a few poses to tell each turn.

@@ -43,8 +43,8 @@ const CLOSED: usize = 3;
 const OUTLYING: f64 = 5.0;
 /// Cosine of the largest angle between the axis of a whole turn and that of the unit that it counts for: 25 degrees.
 pub(crate) const NEAR_AXIS: f64 = 0.9;
-/// Least asymmetry, as an angle after one of the turns, in half-widths of the placement of a pair of turns one way and the other.
-const ASYMMETRIC: f64 = 3.0;
+/// Largest error that an asymmetry leaves, in half-widths of the stated placement. One turn that ended off, and not an asymmetry, leaves half of its error.
+const EXPLAINED: f64 = 2.0;
 /// Probability from which on the whole turns contradict the turns between rests.
 const CONTRADICTED: f64 = 1e-4;
 
@@ -146,8 +146,8 @@ impl Stated {
                     let own = &turns[closure.turns.clone()];
                     let (part_of_axis, error) = closure.about_axis(own, gyro, self.vertical[0])?;
                     let whole = closure.path.turns().round();
-                    let limit = PUT_BACK * self.placement
-                        + 3.0 * sigma(&closure.path, &error.block.by(0)) / part_of_axis.abs();
+                    let sigma = sigma(&closure.path, &error.block.by(0)) / part_of_axis.abs();
+                    let limit = EXPLAINED * self.placement + 3.0 * sigma;
                     let over = error.block.residual[0] / part_of_axis;
                     (counted && part.abs() >= NEAR_AXIS).then_some((
                         k,
@@ -171,9 +171,10 @@ impl Stated {
             let fewest = about.iter().map(|t| t.2).fold(f64::INFINITY, f64::min);
             let half = self.placement / (fewest * (2.0 * pairs).sqrt());
             let explained = |t: &(usize, f64, f64, (f64, f64, f64))| {
-                (t.3.1 - t.1 * t.2 * per_turn).abs() < t.3.2
+                let (asymmetry, limit) = (t.1 * t.2 * per_turn, t.3.2);
+                (t.3.1 - asymmetry).abs() < limit && limit < asymmetry.abs()
             };
-            let shows = per_turn.abs() > ASYMMETRIC * 2f64.sqrt() * half;
+            let shows = per_turn.abs() * fewest > PUT_BACK * self.placement / pairs.sqrt();
             if !(shows && about.iter().all(explained)) {
                 continue;
             }

@@ -13,6 +13,8 @@ use crate::signal::blocks::{Condensed, pool, quantile};
 
 /// Least change of level, in robust standard deviations of the usual difference.
 const SIGMAS: f64 = 10.0;
+/// Least nudge, as a share of the fastest half seconds of a recording: 0.3 degrees where a hand turns by 130 deg/s. A hand that lays a unit down jerks by less.
+const LEAST: f64 = 5e-3;
 /// Least change of the angle of half a second, in robust standard deviations of the usual change, that is a nudge.
 const NUDGED: f64 = 6.0;
 /// Standard deviation of normal deviations over the lower quartile of their magnitudes. The median would not do: in two poses of 2.4 s, most
@@ -62,6 +64,10 @@ pub(crate) fn split_at_nudges(
             let mut channel = Channel::of(segments, condensed, c, width);
             let each = segments.iter();
             channel.usual = usual(each.flat_map(|s| channel.turns(s, length)).collect());
+            let all = channel.turns(&(0..condensed.blocks.len()), length);
+            let mut all: Vec<f64> = all.iter().map(|c| c.abs()).collect();
+            let fastest = quantile(&mut all, 0.98).unwrap_or(0.0);
+            channel.usual = channel.usual.max(LEAST * fastest / NUDGED);
             channel
         })
         .collect();
