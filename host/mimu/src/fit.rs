@@ -8,7 +8,7 @@ mod determined;
 mod earth;
 mod hold_out;
 mod known;
-mod lever_arm;
+pub(crate) mod lever_arm;
 mod magnitudes;
 mod reference_error;
 pub use reference_error::{Cause, Influence};

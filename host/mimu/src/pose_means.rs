@@ -70,7 +70,6 @@ impl Prepared {
             place: means.place.clone(),
             bias_removal: None,
             power_ons: Default::default(),
-            lever_arm_m: 0.0,
             earth_on_table: None,
             prior: None,
         };

@@ -45,8 +45,6 @@ pub struct Prepared {
     pub place: String,
     /// What the firmware did to the gyro's bias, if that shows. A high-pass filter is undone in [`Self::condensed`].
     pub bias_removal: Option<BiasRemoval>,
-    /// See [`Prepared::beside_axis`].
-    pub(crate) lever_arm_m: f64,
     /// Errors of the reference.
     pub(crate) reference_error: Option<ReferenceError>,
     /// The Earth's rate in the dwells on a table; `None` without a table or a gyro.
@@ -175,7 +173,6 @@ impl Prepared {
             noise,
             place,
             bias_removal,
-            lever_arm_m: 0.0,
             earth_on_table: None,
             prior: None,
         };
@@ -270,13 +267,6 @@ impl Prepared {
         sensor.channels().all(|c| self.condensed.has_raw[c])
     }
 
-    /// The accelerometer may be off the axis of a table by `sigma_m`, m, one standard deviation. Least squares and the Kalman bank then
-    /// allow for the centripetal force, and judge the accelerometer by the dwells at rest, if there are any.
-    pub fn beside_axis(mut self, sigma_m: f64) -> Self {
-        self.lever_arm_m = sigma_m;
-        self
-    }
-
     /// Stated errors of the reference.
     pub fn reference_error(&self) -> Option<&ReferenceError> {
         self.reference_error.as_ref()
@@ -285,18 +275,6 @@ impl Prepared {
     /// The reference errs by this much, in place of what the recording states. Least squares allows for it where inputs are known.
     pub fn with_reference_error(mut self, error: ReferenceError) -> Self {
         self.reference_error = Some(error);
-        self
-    }
-
-    /// Excludes the dwells in which a table turns the accelerometer, if there are others: off the axis they contain a centripetal force
-    /// that no reference gives.
-    pub fn accel_at_rest(mut self) -> Self {
-        let usable = |d: &Dwell| d.faults.accel.is_none() && d.input(Sensor::Accel).is_some();
-        if self.dwells.list.iter().any(|d| usable(d) && !d.spins()) {
-            for dwell in self.dwells.list.iter_mut().filter(|d| d.spins()) {
-                dwell.faults.accel.get_or_insert(Fault::Spinning);
-            }
-        }
         self
     }
 

@@ -220,6 +220,15 @@ pub enum Warning {
         "angle and axis of the given turns are assumed to be exact; no interval includes their errors"
     )]
     ExactTurns,
+    /// Position of the accelerometer from the point where the axes of the table meet, mm, body axes, with the halves of 95 % intervals.
+    #[error(
+        "from the point where the axes of the table meet it is {} mm: its place on the table, which is not stored",
+        words::vector(arm_mm, interval_mm)
+    )]
+    BesideAxis {
+        arm_mm: [f64; 3],
+        interval_mm: [f64; 3],
+    },
     /// Dwells whose input moves, and the method that uses their means alone.
     #[error("{} {} an input that moves; {method} uses its mean only, least squares also how the readings follow it", plural(*.dwells, "dwell"), if *.dwells == 1 { "has" } else { "have" })]
     MeansAlone { dwells: u64, method: &'static str },

@@ -91,7 +91,6 @@ impl Progress {
 /// Fits the dwells so far, with the population of the unit's kind if it is known.
 pub fn calibrate(manifest: &Manifest, samples: &Batch, prior: Option<&Prior>) -> Result<Fit> {
     let prepared = Prepared::of(manifest.clone(), samples, STILL_FACTOR)?;
-    let prepared = prepared.beside_axis(LEVER_ARM_M);
     fit(of_population(prepared, prior)?, Options::IN_SAMPLE)
 }
 
@@ -102,9 +101,6 @@ pub fn of_population(prepared: Prepared, prior: Option<&Prior>) -> Result<Prepar
         None => Ok(prepared),
     }
 }
-
-/// Assumed distance of a board's sensors from the axes of a table, m, one standard deviation: 3 to 5 mm are usual.
-pub const LEVER_ARM_M: f64 = 0.01;
 
 /// Uncertainty and target of each parameter.
 pub fn progress(fitted: &Result<Fit>, targets: &Targets) -> Progress {

@@ -18,7 +18,7 @@ use crate::axes;
 use crate::event::{Event, Phase, Question, View};
 use crate::folder::{Begun, Entry, Folder, Part};
 use crate::procedure::{Fixture, SessionConfig};
-use crate::refit::{LEVER_ARM_M, of_population};
+use crate::refit::of_population;
 use crate::resumed::resumed;
 use crate::source::Unit;
 use crate::station::Connect;
@@ -324,7 +324,6 @@ impl OpenSession<'_> {
         let mut fits = Vec::new();
         for (unit, outcome) in self.wizard.units.iter().zip(&mut self.outcomes) {
             let first = prepared(&unit.folder.file(Part::Calibration.name()))?;
-            let first = first.beside_axis(LEVER_ARM_M);
             let first = of_population(first, self.wizard.config.prior.as_ref())?;
             let fitted = fit(first, Options::default())?;
             let given_up = fitted.warnings.iter().filter(|w| w.gives_prior_up());

@@ -184,17 +184,8 @@ pub fn prepared(directory: &Path) -> Result<Prepared> {
     Prepared::read(&Recording::open(directory)?, STILL_FACTOR, |_| {})
 }
 
-/// Judges a calibration by the verification recording; `promised` is the fit that gave it. On a table the accelerometer is judged at rest only.
+/// Judges a calibration by the verification recording; `promised` is the fit that gave it.
 pub fn judge(by: &Prepared, calibration: &Calibration, promised: Option<&Fit>) -> Result<Judged> {
-    judged(&by.clone().accel_at_rest(), calibration, promised)
-}
-
-/// Judges a calibration by all dwells, to compare two calibrations.
-pub fn judge_all(by: &Prepared, calibration: &Calibration) -> Result<Judged> {
-    judged(by, calibration, None)
-}
-
-fn judged(by: &Prepared, calibration: &Calibration, promised: Option<&Fit>) -> Result<Judged> {
     let recorded = by.manifest.recorded.as_ref();
     let power_on = match recorded.is_some_and(|r| !r.restarts.is_empty()) {
         true => PowerOn::Another,

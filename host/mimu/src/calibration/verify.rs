@@ -18,6 +18,7 @@ use crate::calibration::die_temperature::{at_one_temperature, outside};
 use crate::effects::removal::{removable, remove_within};
 use crate::estimate::{Observation, earth_shared};
 use crate::fit::by_rate::variances;
+use crate::fit::lever_arm::without_arm;
 use crate::fit::refuse_wrong_gravity;
 use crate::fit::uncalibrated::{errors, exceeds};
 use crate::judgement::Judgement;
@@ -212,7 +213,7 @@ impl<'a> Readings<'a> {
         let cleaned = without_effects(prepared, calibration)?;
         let curves = calibration.curves();
         let at_one = |p: &Prepared| at_one_temperature(p, calibration, curves.as_ref()?);
-        let cleaned = cleaned.map(|cleaned| at_one(&cleaned).unwrap_or(cleaned));
+        let mut cleaned = cleaned.map(|cleaned| at_one(&cleaned).unwrap_or(cleaned));
         let moved = at_one(prepared);
         if curves.is_some() && moved.is_none() {
             warnings.push(Warning::NoTemperature);
@@ -223,7 +224,22 @@ impl<'a> Readings<'a> {
                 let dwells = RatedDwells::of(&as_read)?;
                 warnings.extend(dwells.exclude_dwells(as_read.to_mut()));
             }
-            Reference::Table | Reference::Gravity => {}
+            Reference::Table => {
+                // The unit is at another place of the table than when it was calibrated.
+                let model = calibration.inverse(Sensor::Accel);
+                let clean = |p: &Prepared| without_arm(p, model.as_ref()?);
+                let found = clean(&as_read);
+                let of_effects = cleaned.as_ref().and_then(clean);
+                if let Some((other, place)) = found {
+                    as_read = Cow::Owned(other);
+                    let place = of_effects
+                        .as_ref()
+                        .map_or(place, |(_, place)| place.clone());
+                    warnings.push(place.of(Sensor::Accel));
+                }
+                cleaned = of_effects.map(|(other, _)| other).or(cleaned);
+            }
+            Reference::Gravity => {}
         }
         Ok(Self {
             as_read,

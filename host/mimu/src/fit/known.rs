@@ -1,5 +1,7 @@
 //! Both triads under a known input: on a table, or in steps of known rate and force.
 
+use std::borrow::Cow;
+
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::hold_out::{Refits, Split, determined};
@@ -82,7 +84,8 @@ pub(super) fn fit_known(
 
 /// The dwells of one sensor with known inputs, and what errs in them.
 struct Known<'a> {
-    prepared: &'a Prepared,
+    /// The recording, where it can be without the force of a lever arm.
+    prepared: Cow<'a, Prepared>,
     options: Options,
     sensor: Sensor,
     observations: Vec<Observation>,
@@ -94,8 +97,8 @@ struct Known<'a> {
     reference: Option<Influences>,
     /// Covariances of the means of each axis by causes that dwells share: wander of the bias, the lever arm, and errors of the reference.
     shared: Option<[DMatrix<f64>; 3]>,
-    /// Whether the accelerometer is beside the axis.
-    off_axis: bool,
+    /// Where on the table the accelerometer is, if that is found.
+    place: Option<Warning>,
 }
 
 impl<'a> Known<'a> {
@@ -110,19 +113,15 @@ impl<'a> Known<'a> {
             within: prepared.within_dwells(sensor),
             weighed: observations.clone(),
             shared: prepared.noise.wander(sensor, dwells),
-            off_axis: sensor == Sensor::Accel && prepared.lever_arm_m > 0.0,
+            place: None,
             reference: None,
-            prepared,
+            prepared: Cow::Borrowed(prepared),
             options,
             sensor,
             observations,
         };
-        if known.off_axis
-            && let Ok(first) = known.estimate(&known.observations, &known.within)
-        {
-            let forward = first.triad.forward.matrix;
-            let lever = lever_arm::covariance(dwells, &forward, prepared.lever_arm_m);
-            known.share(lever);
+        if sensor == Sensor::Accel {
+            known.free_arm();
         }
         if let Some(error) = &prepared.reference_error
             && let Ok(first) = known.estimate(&known.weighed, &known.within)
@@ -134,6 +133,29 @@ impl<'a> Known<'a> {
             }
         }
         known
+    }
+
+    /// Allows for a lever arm, and removes what all axes have in common of it: the sums within dwells are then right too.
+    fn free_arm(&mut self) {
+        let fitted = |known: &Self| {
+            let found = known_input::least_squares(&known.weighed, known.shared.as_ref());
+            found.ok().map(|first| first.triad)
+        };
+        let forward = fitted(self).map(|triad| triad.forward.matrix);
+        let lever = forward.and_then(|f| lever_arm::covariance(&self.prepared, &f));
+        let Some(lever) = lever else { return };
+        self.share(lever);
+        let clean = fitted(self).map(|triad| triad.inverse);
+        let clean = clean.and_then(|inverse| lever_arm::without_arm(&self.prepared, &inverse));
+        if let Some((prepared, place)) = clean {
+            self.observations = prepared.observations(self.sensor);
+            self.within = prepared.within_dwells(self.sensor);
+            for (wide, o) in self.weighed.iter_mut().zip(&self.observations) {
+                wide.raw = o.raw;
+            }
+            self.prepared = Cow::Owned(prepared);
+            self.place = Some(place);
+        }
     }
 
     /// Adds the covariance of an error that dwells share.
@@ -191,7 +213,7 @@ impl<'a> Known<'a> {
     }
 
     fn warnings(&self) -> Vec<Warning> {
-        let mut warnings = Vec::new();
+        let mut warnings = Vec::from_iter(self.place.clone());
         let turn = |o: &Observation| self.prepared.dwells.list[o.dwell].turn;
         if self.sensor == Sensor::Gyro && self.observations.iter().any(turn) {
             warnings.push(Warning::ExactTurns);
@@ -208,7 +230,7 @@ impl<'a> Known<'a> {
     /// The fit with its errors, in sample and held out.
     fn judged(&self, mut estimated: Estimated) -> Result<SensorFit> {
         let influences = self.influences(&mut estimated);
-        let (prepared, sensor) = (self.prepared, self.sensor);
+        let (prepared, sensor) = (&self.prepared, self.sensor);
         let means = self.observations.iter().map(|o| (o, 1.0));
         let within_used = match self.options.method {
             Method::LeastSquares => &self.within[..],
@@ -261,11 +283,6 @@ impl<'a> Known<'a> {
             true => Vec::new(),
             false => self.unseen(&estimated, &all, &held_out, part_of),
         };
-        // In dwells that spin, the force of the arm is not an error of the sensor.
-        let at_rest = |r: &Residual| !prepared.dwells.list[r.dwell].spins();
-        if self.off_axis && residuals.iter().any(at_rest) {
-            residuals.retain(at_rest);
-        }
         let mut fit = finish(
             sensor,
             estimated,

@@ -40,6 +40,15 @@ pub(super) fn without(readings_in_si: bool) -> &'static str {
     }
 }
 
+/// Three values with the halves of their intervals.
+pub(super) fn vector(values: &[f64; 3], halves: &[f64; 3]) -> String {
+    let each = values.iter().zip(halves);
+    let each: Vec<String> = each
+        .map(|(v, half)| format!("{v:.1} ± {half:.1}"))
+        .collect();
+    each.join(", ")
+}
+
 pub(super) fn degrees(rad: f64) -> String {
     significant(rad.abs().to_degrees())
 }

@@ -16,7 +16,7 @@ use crate::event::{Event, Phase, Question};
 use crate::folder::{Entry, Part};
 use crate::procedure::verification;
 use crate::refit::of_population;
-use crate::verdict::{judge_all, prepared};
+use crate::verdict::{judge, prepared};
 use crate::wizard::Ended;
 use mimu_equipment::step::Step;
 
@@ -58,7 +58,7 @@ impl OpenSession<'_> {
         let accepted = diagnosis.sensors.iter().flat_map(|s| &s.decision.accepted);
         let of_unit = accepted.filter(|a| a.of_unit);
         let found: Vec<FittedEffect> = of_unit.map(|a| a.effect.clone()).collect();
-        // On a table, a sensor without effects keeps the earlier fit: only that fit includes the lever arm of a board off the table's axis.
+        // A sensor without effects keeps the earlier fit, which may be the estimate of the device's filters.
         let mut fitted = diagnosis.after.clone();
         if other.manifest.reference == Reference::Table {
             add_mounting_uncertainty(&mut fitted, self.wizard.config.mounting_deg);
@@ -176,9 +176,8 @@ impl OpenSession<'_> {
             if !judged.passed() {
                 continue;
             }
-            // Judged by all dwells: an effect may act only while the table turns.
             let [with, without] =
-                [&found.calibration, &plain.calibration].map(|c| judge_all(&by, c));
+                [&found.calibration, &plain.calibration].map(|c| judge(&by, c, None));
             if !with?.beats(&without?) {
                 let note =
                     "the effects do not improve all sensors in new poses, so they are not stored";

@@ -3,11 +3,13 @@
 use std::ops::Range;
 
 use mimu_core::compensation::Affine;
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{DMatrix, DVector, RowVector3, Vector3};
 
 use super::build::{Builder, Part};
 use super::{Row, RowFigure, Stratum, shared_by_several};
+use crate::diagnose::columns::beside;
 use crate::estimate::{Observation, earth_shared};
+use crate::fit::lever_arm;
 use crate::observable::{Observable, StratumName};
 use crate::quantity::Sensor;
 use crate::signal::contrast::Contrast;
@@ -226,12 +228,32 @@ impl Builder<'_> {
             by_matrix,
             ..
         } = by_table;
+        let nuisance = match self.by_arm() {
+            Some(by_arm) => beside(&nuisance, &by_arm),
+            None => nuisance,
+        };
         let (count, columns) = nuisance.shape();
         let figure = (RowFigure::Input, count, 1);
         let parameters = by_forward(inverse, &self.scale).resize_horizontally(columns, 0.0);
-        // A delay belongs to the session, as a bias does, because the clocks do.
+        // As a bias does, a delay belongs to the session, because the clocks do, and a lever arm, because the place on the table does.
         let biases = [0, 4, 8].into_iter().chain(DELAYS..columns).collect();
         self.finish(y, (nuisance, parameters, by_matrix), biases, strata, figure)
+    }
+
+    /// The rows by a lever arm of the whole unit, m; `None` if the table does not turn an accelerometer.
+    fn by_arm(&self) -> Option<DMatrix<f64>> {
+        let dwells = &self.prepared.dwells.list;
+        let spins = self.rows.iter().any(|row| dwells[row.dwells[0]].spins());
+        if self.sensor != Sensor::Accel || !spins {
+            return None;
+        }
+        let rows = self.rows.iter().map(|row| {
+            let by_block = lever_arm::by_block(self.prepared, &dwells[row.dwells[0]]);
+            let each = row.weights.iter().zip(by_block);
+            let each = each.map(|(weight, by)| weight.transpose() * self.direction * by);
+            <[f64; 3]>::from(each.sum::<RowVector3<f64>>().transpose())
+        });
+        Some(DMatrix::from_row_iterator(rows.len(), 3, rows.flatten()))
     }
 
     /// Sets the angular acceleration and the reading of a dwell with a moving input to those that the reference predicts. The measured reading
