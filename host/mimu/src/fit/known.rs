@@ -141,6 +141,10 @@ impl<'a> Known<'a> {
             let found = known_input::least_squares(&known.weighed, known.shared.as_ref());
             found.ok().map(|first| first.triad)
         };
+        if !self.prepared.noise.is_known(self.sensor) {
+            return;
+        }
+        let alone = (self.weighed.clone(), self.shared.clone());
         let forward = fitted(self).map(|triad| triad.forward.matrix);
         let lever = forward.and_then(|f| lever_arm::covariance(&self.prepared, &f));
         let Some(lever) = lever else { return };
@@ -150,6 +154,13 @@ impl<'a> Known<'a> {
         if let Some((prepared, place)) = clean {
             self.observations = prepared.observations(self.sensor);
             self.within = prepared.within_dwells(self.sensor);
+            if matches!(
+                self.options.method,
+                Method::InverseForm | Method::SixPositions
+            ) {
+                // They take no shared covariance.
+                (self.weighed, self.shared) = alone;
+            }
             for (wide, o) in self.weighed.iter_mut().zip(&self.observations) {
                 wide.raw = o.raw;
             }
