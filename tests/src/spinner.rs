@@ -27,8 +27,6 @@ pub enum Slip {
     Fast,
 }
 
-/// Largest code of 16 bits: the range of the board, ±500 deg/s.
-const LARGEST: f64 = 32767.0;
 /// Time from words to a movement, s.
 const REACTION_S: f64 = 0.8;
 /// Time of one turn, s: at leisure, and too fast.
@@ -36,6 +34,8 @@ const TURN_S: [f64; 2] = [2.2, 0.55];
 /// Amplitude of the wobble of the axis, rad, and its frequencies about the three axes, Hz.
 const WOBBLE: f64 = 0.04;
 const WOBBLE_HZ: [f64; 3] = [1.1, 1.7, 0.7];
+/// Frequencies of the tremor about the three axes, Hz.
+const TREMOR_HZ: [f64; 3] = [5.3, 4.1, 6.7];
 /// Standard deviation of the attitude in which it is put back, rad.
 const PUT_BACK: f64 = 0.005;
 
@@ -57,9 +57,13 @@ pub struct Spinner {
     pub now_s: f64,
     /// The slips of the spins to come.
     pub slips: VecDeque<Slip>,
-    board: TextBoard,
+    /// The board.
+    pub board: TextBoard,
+    /// Amplitude of the tremor of the hands, rad/s.
+    pub tremor: f64,
     random: Random,
-    attitude: Matrix,
+    /// Attitude of the board.
+    pub attitude: Matrix,
     moves: Option<Motion>,
     /// What to do, and when.
     due: Option<(f64, Act)>,
@@ -82,6 +86,7 @@ impl Spinner {
             now_s: 0.0,
             slips: slips.iter().copied().collect(),
             board,
+            tremor: 0.0,
             random: Random::new(seed),
             attitude: rotation([0.4, -0.2, 0.3]),
             moves: None,
@@ -203,13 +208,9 @@ impl Spinner {
             self.moves = None;
         }
         let force = times(&transposed(&self.attitude), [0.0, 0.0, GRAVITY]);
-        let line = self.board.line(at_s, rate, force, &mut self.random);
-        let numbers = line.trim_end().split(',').enumerate();
-        let clipped = numbers.map(|(k, number)| match (k, number.parse::<f64>()) {
-            (1.., Ok(code)) => code.clamp(-LARGEST, LARGEST).to_string(),
-            _ => number.to_string(),
-        });
-        clipped.collect::<Vec<_>>().join(",") + "\r\n"
+        let shaking = |k: usize| self.tremor * (TAU * TREMOR_HZ[k] * at_s).sin();
+        let rate = [0, 1, 2].map(|k| rate[k] + shaking(k));
+        self.board.line(at_s, rate, force, &mut self.random)
     }
 }
 

@@ -24,6 +24,8 @@ pub struct TextBoard {
     pub wired: [Matrix; 2],
     /// Cubic error of the accelerometer, as a fraction of its reading at gravity.
     pub cubic: f64,
+    /// Largest reading, gyro and accelerometer, raw: the end of the range.
+    pub largest: [f64; 2],
     /// Drift of the gyro's biases, rad/s a second.
     pub drift: f64,
     /// Unit of its stamps, s.
@@ -86,6 +88,7 @@ impl TextBoard {
             steps: [1.0; 2],
             wired: [IDENTITY; 2],
             cubic: 0.0,
+            largest: [32767.0; 2],
             drift: 0.0,
             stamps_s: 1e-6,
             lost: 0.0,
@@ -120,11 +123,12 @@ impl TextBoard {
             for row in &self.wired[k] {
                 let read: f64 = row.iter().zip(&own).map(|(a, b)| a * b).sum();
                 let step = self.steps[k];
-                numbers.push(if step > 0.0 {
+                let read = if step > 0.0 {
                     (read / step).round() * step
                 } else {
                     read
-                });
+                };
+                numbers.push(read.clamp(-self.largest[k], self.largest[k]));
             }
         }
         if self

@@ -74,7 +74,10 @@ impl Wizard<'_> {
             let Some(tested) = tested else { continue };
             let failed = tested.named(Verdict::Failed);
             let words = match (failed.is_empty(), &tested.moved) {
-                (true, _) => "all sensors respond as in their data sheets".to_string(),
+                (true, None) => "all sensors respond as in their data sheets".to_string(),
+                (true, Some(moved)) => {
+                    format!("all sensors respond as in their data sheets, but {moved}")
+                }
                 (false, None) => format!("not as in the data sheets: {}", failed.join(", ")),
                 (false, Some(moved)) => {
                     format!("{} failed; the unit moved: {moved}", failed.join(", "))

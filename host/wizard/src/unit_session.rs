@@ -127,6 +127,12 @@ pub struct UnitSession {
     turns: Turns,
     /// Samples at a rail since the last dwell.
     turn_clipped: u64,
+    /// Last tick at which an axis of the accelerometer was at the end of its range at rest, and for how long it has been so in all, s.
+    at_end: Option<(u64, f64)>,
+    /// Gyro's mean readings in the dwells, raw.
+    levels: Vec<Vector3<f64>>,
+    /// Number of dwells before the line of a unit without a number was last lost.
+    lost_at: Option<usize>,
     /// The clock of the samples by the best comparison with this computer's.
     pub clock: Option<ClockRate>,
     /// Consecutive refused fits for another reason than too few dwells.
@@ -170,6 +176,9 @@ impl UnitSession {
             turn_missing: 0,
             turn_clipped: 0,
             turns: Turns::default(),
+            at_end: None,
+            levels: Vec::new(),
+            lost_at: None,
             clock: None,
             refused: 0,
             seen: None,
@@ -293,7 +302,11 @@ impl UnitSession {
                         why,
                     });
                 }
-                StationEvent::Back(_) => self.interrupted(Interruption::Back, tell)?,
+                StationEvent::Back(unit) => {
+                    let nameless = !unit.is_device;
+                    self.lost_at = nameless.then_some(self.levels.len()).or(self.lost_at);
+                    self.interrupted(Interruption::Back, tell)?;
+                }
             }
         }
         Ok(some)
@@ -447,6 +460,7 @@ impl UnitSession {
         match (found, self.dwell) {
             (Err(why), _) => {
                 self.discard(&why, tell)?;
+                self.check_range(seen, &why)?;
                 let why = self.while_turning(why);
                 if self.state.waiting.as_ref() != Some(&why) {
                     // Changes of its numbers are shown in the state only.
@@ -573,6 +587,7 @@ impl UnitSession {
         })?;
         self.number += 1;
         self.away = false;
+        self.levels.push(Vector3::from_fn(|c, _| seen.mean[c]));
         (self.dwell, self.done, self.state.left_s) = (None, self.spin.is_none(), None);
         tell.push(Event::Dwell {
             unit: self.name(),
@@ -584,11 +599,11 @@ impl UnitSession {
         let missing = std::mem::take(&mut self.turn_missing);
         let clipped = std::mem::take(&mut self.turn_clipped);
         if config.fixture != Fixture::Table && number > 0 && self.spin.is_none() {
-            self.count_turn(missing, tell)?;
-            self.tell_clipped(clipped, tell);
+            self.count_turn([missing, clipped], tell)?;
         }
         if self.part == Part::Calibration {
             self.refit(config);
+            self.check_unit_is_same()?;
             self.check_hope()?;
             tell.push(Event::Progress {
                 unit: self.name(),

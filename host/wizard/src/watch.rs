@@ -5,7 +5,8 @@ use std::collections::VecDeque;
 use mimu::quantity::Sensor;
 use mimu::signal::stillness::{STILL_FACTOR, WINDOW_S};
 use mimu_core::compensation::Affine;
-use mimu_recording::health::{Finding, Repetition, StuckChannel};
+use mimu_recording::RAW_COLUMNS;
+use mimu_recording::health::{Fault, Finding, Repetition, StuckChannel};
 use nalgebra::{Matrix3, Vector3};
 
 use crate::source::Chunk;
@@ -72,6 +73,8 @@ impl Moments {
 struct Block {
     moments: Moments,
     saturated: bool,
+    /// Rows of each channel at its lowest or highest value so far.
+    at_end: [u64; 6],
     missing: u64,
     /// Rows that repeat the row before.
     repeats: f64,
@@ -88,8 +91,8 @@ pub struct LastSecond {
     pub mean: [f64; 6],
     /// Standard deviations of gyro and accelerometer, relative to the limit of rest; the worst axis.
     pub motion: [f64; 2],
-    /// Whether a reading may be at a rail.
-    pub saturated: bool,
+    /// If a reading may be at a rail: the channel that is most often at its extreme, or all.
+    pub saturated: Option<Finding>,
     /// Missing samples in this second.
     pub missing: u64,
     /// Temperature, °C.
@@ -118,6 +121,8 @@ pub struct Watch {
     /// Mean readings at rest, and the sum of the gyro's variances in that second, once two successive seconds have agreed.
     rest: Option<([f64; 6], f64)>,
     channels: [StuckChannel; 6],
+    /// Lowest and highest reading of each channel so far.
+    extremes: [[f64; 2]; 6],
     /// Whether the unit has moved since [`Self::begin`].
     moved: bool,
     /// The seconds that ended within the last one: means and variances of the gyro.
@@ -147,6 +152,7 @@ impl Watch {
             floor: None,
             rest: None,
             channels: [StuckChannel::default(); 6],
+            extremes: [[f64::INFINITY, f64::NEG_INFINITY]; 6],
             moved: false,
             before: VecDeque::new(),
             begun: false,
@@ -177,6 +183,10 @@ impl Watch {
             self.open.moments.add(row);
             for (channel, value) in self.channels.iter_mut().zip(row) {
                 channel.take(*value);
+            }
+            for (c, ([low, high], value)) in self.extremes.iter_mut().zip(row).enumerate() {
+                (*low, *high) = (low.min(*value), high.max(*value));
+                self.open.at_end[c] += u64::from(value == low || value == high);
             }
             self.open.saturated |= chunk.saturated;
             self.open.repeats += f64::from(self.repetition.take(row));
@@ -357,7 +367,8 @@ impl Watch {
             .next();
         // A coarse step hides at least this variance.
         let variance: [f64; 6] = std::array::from_fn(|c| own[c].max(channels[c].hidden()));
-        let sound = stuck.is_none() && !saturated && !held;
+        let saturated = saturated.then(|| self.at_end());
+        let sound = stuck.is_none() && saturated.is_none() && !held;
         if sound {
             // Only before the unit may be turned: a table's steady rate is as quiet as rest.
             if !self.begun {
@@ -387,7 +398,7 @@ impl Watch {
         let rate = self
             .rest
             .map(|(rest, _)| [0, 1, 2].map(|c| all.mean[c] - rest[c]));
-        if let Some(rate) = rate.filter(|_| self.begun && !saturated) {
+        if let Some(rate) = rate.filter(|_| self.begun && saturated.is_none()) {
             self.largest_rate = self.largest_rate.max(Vector3::from(rate).norm());
         }
         let seems_exchanged = self.rest.is_some_and(|(rest, _)| {
@@ -419,6 +430,16 @@ impl Watch {
             stuck,
             exchanged,
             learnt,
+        }
+    }
+
+    /// The finding about the channel that was most often at its extreme in the last second, of those that have had several values.
+    fn at_end(&self) -> Finding {
+        let count = |c: usize| self.window.iter().map(|b| b.at_end[c]).sum::<u64>();
+        let varied = (0..6).filter(|c| self.extremes[*c][0] < self.extremes[*c][1]);
+        match varied.max_by_key(|c| count(*c)) {
+            Some(c) => Finding::new(RAW_COLUMNS[c], count(c), Fault::AtEnd),
+            None => Finding::of_all(0, Fault::AtEnd),
         }
     }
 

@@ -39,20 +39,20 @@ impl View for Told {
     }
 }
 
-struct Led {
+pub struct Led {
     session: Session,
-    arrivals: Sender<Stamped>,
+    pub arrivals: Sender<Stamped>,
     events: Receiver<Event>,
 }
 
-fn begin(out: &Path, person: &Spinner) -> Led {
+pub fn begin(out: &Path, person: &Spinner, more: &str) -> Led {
     let (arrivals, heard) = channel();
     let (tell, events) = channel();
     let arguments = format!(
-        "wizard -o {} --port USB --gravity 9.793 --text t_us,ax,ay,az,gx,gy,gz --device unit --dwell 2 --warm-up 0 --as-planned --trust-clock --whole-turns --placement 0.6",
+        "wizard -o {} --port USB --gravity 9.793 --text t_us,ax,ay,az,gx,gy,gz --device unit --dwell 2 --warm-up 0 --as-planned --trust-clock {more}",
         out.display()
     );
-    let arguments: Vec<OsString> = arguments.split(' ').map(OsString::from).collect();
+    let arguments: Vec<OsString> = arguments.split_whitespace().map(OsString::from).collect();
     let session =
         wizard(arguments, heard, Box::new(Told(tell))).unwrap_or_else(|_| panic!("refused"));
     let _ = arrivals.send((person.now_s, Arrival::Opened));
@@ -63,23 +63,25 @@ fn begin(out: &Path, person: &Spinner) -> Led {
     }
 }
 
-type Ended = (Option<Outcome>, Option<String>);
+pub type Ended = (Option<Outcome>, Option<String>);
 
 impl Led {
     /// Until the session ends, or `stop` says so of an event.
-    fn lead(
+    pub fn lead(
         &mut self,
         person: &mut Spinner,
         said: &mut Vec<String>,
         stop: impl Fn(&Event) -> bool,
     ) -> Option<Ended> {
         while person.now_s < 3600.0 {
+            let mut stopped = false;
             for event in self.events.try_iter().collect::<Vec<_>>() {
                 person.hear(&event);
                 said.extend(wizard_lines(&event));
-                if stop(&event) {
-                    return None;
-                }
+                stopped |= stop(&event);
+            }
+            if stopped {
+                return None;
             }
             let _ = self
                 .arrivals
@@ -117,7 +119,7 @@ fn a_person_who_errs_in_whole_turns_is_told_so_and_ends_with_scale_factors_to_a_
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
     let mut said = Vec::new();
-    let mut led = begin(&out, &person);
+    let mut led = begin(&out, &person, "--whole-turns --placement 0.6");
     // Killed in the middle of the third spin of six.
     let in_third =
         |event: &Event| matches!(event, Event::Turned { axis, turns: 3, .. } if axis == "+x");
@@ -126,7 +128,7 @@ fn a_person_who_errs_in_whole_turns_is_told_so_and_ends_with_scale_factors_to_a_
     // Its slip was lost with it.
     person.slips.push_front(Slip::HalfWay);
     let before = said.len();
-    let mut led = begin(&out, &person);
+    let mut led = begin(&out, &person, "--whole-turns --placement 0.6");
     let (outcome, refused) = led
         .lead(&mut person, &mut said, |_| false)
         .expect("it ends");

@@ -13,6 +13,7 @@ mod frozen;
 mod joint;
 mod judged;
 mod judgement;
+mod led_mistakes;
 mod led_whole_turns;
 mod module_circles;
 mod next_experiment;

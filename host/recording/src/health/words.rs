@@ -231,7 +231,7 @@ impl Finding {
             | Fault::FullScale { .. }
             | Fault::RunAtEnd { .. }
             | Fault::CalmEnd { .. } => "give the sensor a larger range, or turn it more slowly",
-            Fault::AtEnd => "put it down",
+            Fault::AtEnd => "put it down, or give the sensor a larger range",
             Fault::AllZero => {
                 "check that the right columns were named, and that the sensor was connected"
             }

@@ -24,10 +24,14 @@ const RATE_DPS: f64 = 2.0;
 const UNIT_RATIO: f64 = 10.0;
 /// Turn of the direction of gravity in a second that counts, rad.
 const LEAST_TILT: f64 = 0.1;
-/// Turns of the direction of gravity after which they are compared, rad: half a turn in all.
-const ENOUGH_TILT: f64 = 3.0;
-/// If this many consecutive turns, and more than half of all, lack samples, this is no accident: the gyro cannot be calibrated this way.
+/// Turns of the direction of gravity after which they are compared, rad: less than a quarter turn, because in shaking hands no dwell may begin after it.
+const ENOUGH_TILT: f64 = 1.0;
+/// If this many consecutive turns, and more than half of all, lack samples or leave the gyro's range, this is no accident: the gyro cannot be calibrated this way.
 const LOST_IN_A_ROW: u32 = 4;
+/// Change of the gyro's rates at rest that no power-on makes, rad/s (1 deg/s: low-cost parts change by some tenths), and in multiples of their scatter.
+const OTHER_UNIT: (f64, f64) = (0.0175, 6.0);
+/// Time at rest with an axis of the accelerometer at the end of its range, s: a bump is over sooner.
+const AT_END_S: f64 = 10.0;
 
 impl UnitSession {
     /// Why no dwell can run now, if so.
@@ -43,14 +47,15 @@ impl UnitSession {
         if busy {
             return Some(Waiting::TableMoves);
         }
-        if let Some(stuck) = seen.stuck {
-            return Some(Waiting::Faulty(stuck));
+        // A channel that clips has one value, and looks stuck.
+        let clips = seen
+            .saturated
+            .filter(|end| seen.stuck.is_none_or(|s| s.about == end.about));
+        if let Some(found) = clips.or(seen.stuck) {
+            return Some(Waiting::Faulty(found));
         }
         if seen.missing as f64 > share * rate_hz {
             return Some(Waiting::SamplesLost(seen.missing, rate_hz));
-        }
-        if seen.saturated {
-            return Some(Waiting::Faulty(Finding::of_all(0, Fault::AtEnd)));
         }
         if seen.exchanged && !self.station.unit.is_device && !self.spins() {
             return Some(Waiting::Faulty(Finding::of_all(0, Fault::Exchanged)));
@@ -185,40 +190,26 @@ impl UnitSession {
         Err(Error::device(self.name(), problem, remedy).about(Argument::RawUnit))
     }
 
-    /// Counts turns with missing samples, which cannot calibrate the gyro. `missing`: missing samples in the turn before the completed dwell.
-    pub(super) fn count_turn(&mut self, missing: u64, tell: &mut Vec<Event>) -> Result<()> {
-        let lost = missing > 0;
-        self.turns = self.turns.with(lost);
-        if !lost {
-            return Ok(());
+    /// Counts turns that cannot calibrate the gyro, by the samples that are missing and at the end of a range in the turn before the completed dwell: all
+    /// samples of a turn are integrated.
+    ///
+    /// Errors: too many in a row cannot.
+    pub(super) fn count_turn(
+        &mut self,
+        [missing, clipped]: [u64; 2],
+        tell: &mut Vec<Event>,
+    ) -> Result<()> {
+        self.turns = self.turns.with([missing > 0, clipped > 0]);
+        if missing > 0 {
+            let words = format!(
+                "{}: the turn to it lacks {missing} samples and is not used for the gyro",
+                self.name()
+            );
+            tell.push(Event::Note { words });
         }
-        let words = format!(
-            "{}: the turn to it lacks {missing} samples and is not used for the gyro",
-            self.name()
-        );
-        tell.push(Event::Note { words });
-        let Turns {
-            all,
-            lost,
-            in_a_row,
-        } = self.turns;
-        if in_a_row < LOST_IN_A_ROW || 2 * lost <= all {
-            return Ok(());
-        }
-        let share = self.state.lost as f64 / (self.state.lost + self.state.samples) as f64;
-        let problem = format!(
-            "samples are missing in {lost} of {all} turns ({} % of all samples), and only complete turns calibrate the gyro",
-            significant(100.0 * share)
-        );
-        let remedy = "let the board write fewer or shorter lines, or use more bits per second; check the cable";
-        Err(Error::device(self.name(), problem, remedy).about(Argument::Baud))
-    }
-
-    /// Reports samples at a rail in the turn before the completed dwell: all samples of a turn are integrated.
-    pub(super) fn tell_clipped(&self, clipped: u64, tell: &mut Vec<Event>) {
         if clipped > 0 {
             let words = format!(
-                "{}: in the turn to it {} at the end of a range: turn it more slowly, or the gyro cannot use this turn",
+                "{}: in the turn to it {} at the end of a range: turn it more slowly, or give the gyro a larger range; such a turn is not used for it",
                 self.name(),
                 match clipped {
                     1 => "1 sample is".into(),
@@ -227,6 +218,91 @@ impl UnitSession {
             );
             tell.push(Event::Note { words });
         }
+        let Turns {
+            all,
+            lost: [missing, clipped],
+            in_a_row,
+        } = self.turns;
+        if in_a_row < LOST_IN_A_ROW || 2 * missing.max(clipped) <= all {
+            return Ok(());
+        }
+        if clipped > missing {
+            let problem = format!(
+                "the gyro is at the end of its range in {clipped} of {all} turns, and only turns within it calibrate the gyro"
+            );
+            let remedy = "turn the unit more slowly, or set a larger range on the board";
+            return Err(Error::device(self.name(), problem, remedy));
+        }
+        let share = self.state.lost as f64 / (self.state.lost + self.state.samples) as f64;
+        let problem = format!(
+            "samples are missing in {missing} of {all} turns ({} % of all samples), and only complete turns calibrate the gyro",
+            significant(100.0 * share)
+        );
+        let remedy = "let the board write fewer or shorter lines, or use more bits per second; check the cable";
+        Err(Error::device(self.name(), problem, remedy).about(Argument::Baud))
+    }
+
+    /// Ends the session if the gyro rests at another level since the line came back than before.
+    ///
+    /// Errors: the unit, which has no number, is another one.
+    pub(super) fn check_unit_is_same(&self) -> Result<()> {
+        let (Some(at), Some([gyro, _])) = (self.lost_at, &self.fitted) else {
+            return Ok(());
+        };
+        let si = |raw: &Vector3<f64>| gyro.inverse.matrix * raw;
+        let (before, after) = self.levels.split_at(at);
+        let mean = |of: &[Vector3<f64>]| of.iter().map(si).sum::<Vector3<f64>>() / of.len() as f64;
+        if before.len() < 2 || after.is_empty() {
+            return Ok(());
+        }
+        let level = mean(before);
+        let squares = before.iter().map(|raw| (si(raw) - level).norm_squared());
+        let scatter = (squares.sum::<f64>() / (before.len() - 1) as f64).sqrt();
+        let jump = (mean(after) - level).norm();
+        if jump < OTHER_UNIT.0 || jump < OTHER_UNIT.1 * scatter {
+            return Ok(());
+        }
+        let problem = format!(
+            "since the line came back after dwell {at}, the gyro reads {} deg/s more at rest, which no power-on changes: it is another unit",
+            significant(jump.to_degrees())
+        );
+        let remedy =
+            "plug in one unit for the whole session, and start a new one in another folder";
+        Err(Error::device(self.name(), problem, remedy))
+    }
+
+    /// Ends the session if the accelerometer is at the end of its range where the unit rests: no other pose is better for that axis.
+    ///
+    /// Errors: it has been so for [`AT_END_S`] in all.
+    pub(super) fn check_range(&mut self, seen: &LastSecond, why: &Waiting) -> Result<()> {
+        let Waiting::Faulty(Finding {
+            about: Some(axis),
+            fault: Fault::AtEnd,
+            ..
+        }) = why
+        else {
+            return Ok(());
+        };
+        let rests = seen.motion[Sensor::Gyro as usize] <= motion_limits(0.0)[0];
+        if !rests || !axis.starts_with(Sensor::Accel.name()) {
+            return Ok(());
+        }
+        let passed = seen
+            .tick
+            .saturating_sub(self.at_end.map_or(seen.tick, |(last, _)| last));
+        let period_s = 1.0 / self.station.unit.rate_hz;
+        // Looks at a unit are tenths of a second apart.
+        let passed_s = (passed as f64 * period_s).min(0.2);
+        let lasted_s = passed_s + self.at_end.map_or(0.0, |(_, lasted_s)| lasted_s);
+        self.at_end = Some((seen.tick, lasted_s));
+        if lasted_s < AT_END_S {
+            return Ok(());
+        }
+        let problem = format!(
+            "{axis} is at the end of its range where the unit rests, so that gravity is not read"
+        );
+        let remedy = "set a larger range of the accelerometer on the board, and start a new session in another folder";
+        Err(Error::device(self.name(), problem, remedy))
     }
 }
 
@@ -272,17 +348,22 @@ impl Tilts {
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Turns {
     all: u32,
-    /// Turns with missing samples.
-    lost: u32,
+    /// Turns with missing samples, and those with samples at the end of a range.
+    lost: [u32; 2],
+    /// Consecutive turns with either.
     in_a_row: u32,
 }
 
 impl Turns {
-    fn with(self, lost: bool) -> Self {
+    fn with(self, lost: [bool; 2]) -> Self {
         Self {
             all: self.all + 1,
-            lost: self.lost + u32::from(lost),
-            in_a_row: if lost { self.in_a_row + 1 } else { 0 },
+            lost: [0, 1].map(|k| self.lost[k] + u32::from(lost[k])),
+            in_a_row: if lost.contains(&true) {
+                self.in_a_row + 1
+            } else {
+                0
+            },
         }
     }
 }
