@@ -3,7 +3,7 @@
 use nalgebra::{RealField, convert};
 
 use super::law::{
-    COEFFICIENTS, Evaluation, FACTORS, Fast, Law, Nonlinear, Slowly, error_at_ends, is_bounded,
+    COEFFICIENTS, Evaluation, FACTORS, Fast, Law, Nonlinear, Slowly, is_bounded, ordinary_error,
     term,
 };
 use crate::Sensor;
@@ -204,7 +204,7 @@ impl<T: RealField + Copy> DeviceEffect<T> {
         if let Some(one) = alone.coefficients.get_mut(axis) {
             *one = coefficient;
         }
-        if !is_bounded(error_at_ends(&alone, sensor), sensor) {
+        if !is_bounded(ordinary_error(&alone, sensor), sensor) {
             return Err(EffectError::Value);
         }
         Ok(Self {

@@ -33,47 +33,42 @@ pub(super) struct Fast<T: RealField> {
     pub factors: [u8; FACTORS],
 }
 
-/// Largest inputs of consumer and tactical parts: 4000 deg/s, and 100 g.
-const LARGEST: [f64; 2] = [70.0, 1000.0];
-/// Largest difference from the reference temperature, °C.
-const LARGEST_TEMPERATURE: f64 = 150.0;
-/// Error of one coefficient over the largest input that is refused beyond. A coefficient of a part with a small range is extrapolated to the
-/// largest input here: a cubic error of 10 % at 1 g is 1000 times the largest input at 100 g.
-const MOST_ERROR: f64 = 1e4;
+/// Ordinary inputs, which every part measures: 1 rad/s, and a little more than gravity, m/s². No coefficient of a correction makes an error as large as these. At
+/// the end of a range it may: a cubic error of 1 % at 1 g is 100 g at 100 g.
+const ORDINARY: [f64; 2] = [1.0, 10.0];
+/// Difference from the reference temperature at which the same holds, °C, and time, s.
+const TEMPERATURE: f64 = 10.0;
+const TIME: f64 = 1e3;
 
-fn largest<T: RealField>(sensor: Sensor) -> T {
-    let [rate, force] = LARGEST;
+fn ordinary<T: RealField>(sensor: Sensor) -> T {
+    let [rate, force] = ORDINARY;
     convert(match sensor {
         Sensor::Gyro => rate,
         Sensor::Accel => force,
     })
 }
 
-/// Whether an error at the ends of the ranges is one that a sensor can have.
+/// Whether an error at ordinary inputs is one that a correction may have.
 pub(super) fn is_bounded<T: RealField + Copy>(error: T, sensor: Sensor) -> bool {
-    error <= largest::<T>(sensor) * convert(MOST_ERROR)
+    error <= ordinary::<T>(sensor)
 }
 
-/// The largest error of an axis by `law` at the ends of the ranges.
-pub(super) fn error_at_ends<T: RealField + Copy>(law: &Fast<T>, sensor: Sensor) -> T {
-    let [rate, force]: [T; 2] = LARGEST.map(convert);
+/// The largest error of an axis by `law` at ordinary inputs.
+pub(super) fn ordinary_error<T: RealField + Copy>(law: &Fast<T>, sensor: Sensor) -> T {
+    let [rate, force]: [T; 2] = ORDINARY.map(convert);
     let both = [rate, rate, rate, force, force, force];
     let mut values = [T::one(); 10];
     for (value, end) in values.iter_mut().skip(1).zip(both) {
         *value = end;
     }
-    // Temperature, its rate in °C/s, and three hours.
-    for (value, end) in values
-        .iter_mut()
-        .skip(7)
-        .zip([LARGEST_TEMPERATURE, 1.0, 1e4])
-    {
+    // Temperature, its rate in °C/s, and time.
+    for (value, end) in values.iter_mut().skip(7).zip([TEMPERATURE, 1.0, TIME]) {
         *value = convert(end);
     }
     let at = Conditions {
         values,
-        angular_acceleration: Vector3::repeat(convert(1e4)),
-        sensed: Vector3::repeat(largest(sensor)),
+        angular_acceleration: Vector3::repeat(convert(10.0)),
+        sensed: Vector3::repeat(ordinary(sensor)),
     };
     let mut error = Vector3::zeros();
     (law.law)(law, &at, &mut error);
@@ -204,9 +199,9 @@ impl<T: RealField + Copy> Law<T> {
         }),
     ];
 
-    /// Whether the errors by each coefficient alone are at most [`MOST_ERROR`] times the largest input of `sensor`, at any reading within range.
+    /// Whether the errors by each coefficient alone [are bounded](is_bounded).
     pub fn is_bounded(&self, sensor: Sensor, coefficients: &[T; COEFFICIENTS]) -> bool {
-        let largest = largest(sensor);
+        let ordinary = ordinary(sensor);
         coefficients.iter().enumerate().all(|(k, coefficient)| {
             // Alone, because two may cancel at one input and not at another.
             let mut alone = [T::zero(); COEFFICIENTS];
@@ -220,7 +215,7 @@ impl<T: RealField + Copy> Law<T> {
                         coefficients: alone,
                         factors: [0; FACTORS],
                     };
-                    error_at_ends(&law, sensor)
+                    ordinary_error(&law, sensor)
                 }
                 Evaluation::Slow(law) => {
                     let mut slow = Slow {
@@ -231,11 +226,11 @@ impl<T: RealField + Copy> Law<T> {
                     let at = Ambient {
                         time: T::zero(),
                         settled: false,
-                        temperature_offset: convert(LARGEST_TEMPERATURE),
-                        lag: convert(LARGEST_TEMPERATURE),
+                        temperature_offset: convert(TEMPERATURE),
+                        lag: convert(TEMPERATURE),
                     };
                     law(&alone, T::one(), &at, &mut slow);
-                    slow.bias.amax() + (slow.along.amax() + slow.across.amax()) * largest
+                    slow.bias.amax() + (slow.along.amax() + slow.across.amax()) * ordinary
                 }
             };
             is_bounded(error, sensor)

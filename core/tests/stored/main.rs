@@ -91,8 +91,8 @@ fn resealed(mut bytes: Vec<u8>) -> Vec<u8> {
 #[test]
 fn the_layout_is_that_of_the_table_in_the_documentation() {
     let effects = [
-        DeviceEffect::named("gyro_warm_up", &[1.0, 2.0, 3.0], Some(60.0)),
-        DeviceEffect::term(Sensor::Accel, 1, -2.0, &[Variable::RateX, Variable::ForceY]),
+        DeviceEffect::named("gyro_warm_up", &[0.25, 0.5, 0.75], Some(60.0)),
+        DeviceEffect::term(Sensor::Accel, 1, -0.5, &[Variable::RateX, Variable::ForceY]),
     ]
     .map(Result::unwrap);
     // Sensors along -y, x and z with 2, 4 and 0.5 V per unit; and C of a gyro with its sensors along y, -x and z.
@@ -168,11 +168,11 @@ fn the_layout_is_that_of_the_table_in_the_documentation() {
         expected.extend(value.to_le_bytes());
     }
     expected.extend(b"\x00\x0cgyro_warm_up\x03");
-    for value in [1.0_f32, 2.0, 3.0, 60.0] {
+    for value in [0.25_f32, 0.5, 0.75, 60.0] {
         expected.extend(value.to_le_bytes());
     }
     expected.extend([1, 1, 1, 2, 1, 5]);
-    expected.extend((-2.0_f32).to_le_bytes());
+    expected.extend((-0.5_f32).to_le_bytes());
     expected.extend(crc32(&expected).to_le_bytes());
     assert_eq!(all, &expected[..]);
     let stored = decode(all).unwrap();

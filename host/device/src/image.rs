@@ -250,7 +250,7 @@ pub(super) fn effects_of(calibration: &Calibration, place: &str) -> Result<Vec<D
         effect.on_device().map_err(|why| {
             let at = format!("{place}, [[effect]] {}", effect.id());
             let remedy = match why {
-                NotOnDevice::Numbers => "diagnose the recording again",
+                NotOnDevice::Numbers(_) => "diagnose the recording again",
                 _ => "use a calibration without it, or apply it on the PC only",
             };
             Error::new(at, why.to_string(), remedy)

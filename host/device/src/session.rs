@@ -259,16 +259,10 @@ pub fn refused(port: &str, purpose: &str, refusal: &Refusal) -> Error {
             format!("it has room for {room} bytes"),
             "use fewer temperature nodes or effects",
         ),
-        Refusal::WrongOffset { expected } => {
-            (format!("it expects byte {expected} next"), "upload again")
-        }
-        Refusal::Incomplete { received } => (
-            format!("it has received {received} bytes only"),
-            "upload again",
-        ),
-        Refusal::WrongHash { found } => (
-            format!("the received bytes have another hash, {found:016x}"),
-            "upload again",
+        // Every frame has a checksum, so that bytes that differ are somebody else's.
+        Refusal::WrongOffset { .. } | Refusal::Incomplete { .. } | Refusal::WrongHash { .. } => (
+            "it has another upload in hand than this program's: two programs upload at once".into(),
+            "end the other program, and upload again",
         ),
         Refusal::NotUsable(reason) => (
             format!("it cannot use the bytes as a calibration: {}", reason),

@@ -133,6 +133,11 @@ fn send(
             Answer::Refused(Refusal::WrongOffset { expected }) if (expected as usize) < offset => {
                 offset = expected as usize;
             }
+            // It had room for this one when it was begun.
+            Answer::Refused(Refusal::TooLong { .. }) => {
+                let other = Refusal::WrongOffset { expected: 0 };
+                return Err(refused(session.port(), purpose, &other));
+            }
             Answer::Refused(refusal) => return Err(refused(session.port(), purpose, &refusal)),
             _ => return Err(session.unexpected(purpose)),
         }

@@ -68,7 +68,7 @@ impl Calibration {
             };
             const WITHOUT: &str = "update the device, or use the calibration without effects";
             let on_device = effect.on_device().map_err(|why| match why {
-                NotOnDevice::Numbers => refuse(why.to_string(), "diagnose the recording again"),
+                NotOnDevice::Numbers(_) => refuse(why.to_string(), "diagnose the recording again"),
                 _ => refuse(why.to_string(), WITHOUT),
             })?;
             all.push(on_device).map_err(|_| {

@@ -12,7 +12,7 @@ use crate::effects::candidate::CandidateKind;
 use crate::effects::quantity::Quantity;
 
 /// Why no device removes an effect.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub enum NotOnDevice {
     /// No device has its law.
     NoLaw,
@@ -20,19 +20,21 @@ pub enum NotOnDevice {
     NoFactor,
     /// It is a jump, which is over.
     Jump,
-    /// A device has its law, but does not take its numbers.
-    Numbers,
+    /// A device has its law, but does not take its numbers: the first of these, with its name.
+    Numbers(String),
 }
 
 impl fmt::Display for NotOnDevice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
+            Self::Numbers(number) => {
+                return write!(f, "{number} is impossible: at 1 g, 1 rad/s and 10 K the effect would exceed the input");
+            }
             Self::NoLaw => "devices do not remove this effect",
             Self::NoFactor => "it has a factor that devices do not know",
             Self::Jump => {
                 "a bias that has jumped once may jump again, so the jump cannot be removed later"
             }
-            Self::Numbers => "its numbers are invalid for the device",
         })
     }
 }
@@ -43,9 +45,18 @@ impl FittedEffect {
     /// # Errors
     /// Why no device removes it.
     pub fn on_device<T: RealField + Copy>(&self) -> Result<DeviceEffect<T>, NotOnDevice> {
+        self.form().map_err(|why| match why {
+            NotOnDevice::Numbers(_) => NotOnDevice::Numbers(self.refused()),
+            other => other,
+        })
+    }
+
+    /// The same, without saying which number is refused.
+    fn form<T: RealField + Copy>(&self) -> Result<DeviceEffect<T>, NotOnDevice> {
         let candidate = &self.candidate;
         let sensor = candidate.sensor;
-        let numbers = |made: Result<_, EffectError>| made.map_err(|_| NotOnDevice::Numbers);
+        let numbers =
+            |made: Result<_, EffectError>| made.map_err(|_| NotOnDevice::Numbers(String::new()));
         match &candidate.kind {
             CandidateKind::Effect(effect) if !EFFECTS.contains(&effect.id) => {
                 Err(NotOnDevice::NoLaw)
@@ -73,6 +84,24 @@ impl FittedEffect {
                 numbers(term)
             }
             CandidateKind::Jump { .. } => Err(NotOnDevice::Jump),
+        }
+    }
+
+    /// The number that a device refuses, with its name.
+    fn refused(&self) -> String {
+        let alone = |k: Option<usize>| {
+            let mut one = self.clone();
+            let values = one.values.iter_mut().enumerate();
+            values.for_each(|(at, value)| *value *= f64::from(u8::from(Some(at) == k)));
+            one.form::<f64>().is_err()
+        };
+        let constant = self.nonlinear_parameter().filter(|_| alone(None));
+        let named = self.coefficients().into_iter().enumerate();
+        let mut refused = named.filter(|(k, _)| alone(Some(*k)));
+        match (constant, refused.next()) {
+            (Some(constant), _) => format!("{} = {:?} s", constant.name, constant.value),
+            (None, Some((_, c))) => format!("{} = {:?} {}", c.name, c.value, c.unit),
+            (None, None) => "one of its numbers".into(),
         }
     }
 

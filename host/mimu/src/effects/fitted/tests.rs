@@ -106,6 +106,34 @@ fn an_effect_that_the_device_lacks_is_refused() {
 }
 
 #[test]
+fn a_number_that_no_correction_has_is_refused_by_its_name_and_value() {
+    let refused = |id: &str, values: &[f64], parameter: f64| {
+        let fitted = FittedEffect::new(candidate(id).unwrap(), parameter, values.to_vec());
+        fitted.on_device::<f32>().unwrap_err().to_string()
+    };
+    for (why, number) in [
+        (
+            refused("accel_scale_quadratic", &[1e-4, 0.2, 0.0], 0.0),
+            "y = 0.2 ",
+        ),
+        (
+            refused("gyro_thermal_bias", &[0.0, 0.0, 1.0, 0.0, 0.0, 0.0], 0.0),
+            "z = 1.0 rad/s/",
+        ),
+        (refused("gyro_warm_up", &[1e-3; 3], -60.0), "= -60.0 s"),
+        (
+            refused("term:accel_y~rate_x*force_y", &[3.0], 0.0),
+            "y = 3.0 ",
+        ),
+    ] {
+        assert!(
+            why.contains(number) && why.contains("is impossible"),
+            "{why}"
+        );
+    }
+}
+
+#[test]
 fn an_effect_that_is_found_again_adds_to_what_is_known() {
     let fitted = |id: &str, value: f64, parameter: f64| {
         let candidate = candidate(id).unwrap();
