@@ -166,8 +166,9 @@ impl<F: NorFlash> Slots<F> {
     /// complete, or the previous one. If it is in use already, with a readable front end and beside no unusable one, it is not written again: a sector lasts for
     /// 10 000 erases.
     pub async fn store(&mut self, bytes: &[u8], front_end: &FrontEnd) -> Result<(), Failed> {
-        let whole = !self.younger_unusable && self.front_end().await.is_some();
-        if whole && self.holds(bytes).await {
+        let sound = |slot: &Slot| matches!(slot, Slot::Empty | Slot::Whole { .. });
+        let sound = self.state.iter().all(sound) && self.front_end().await.is_some();
+        if sound && self.holds(bytes).await {
             return Ok(());
         }
         let slot = match self.in_use {

@@ -277,6 +277,17 @@ fn wherever_the_supply_fails_the_old_or_the_new_one_is_whole() {
                 );
                 assert!(!reported || after.as_ref() == Some(&new), "{left} {tear}");
                 assert_eq!(reported, left > operations, "{left} {tear}");
+                // The same one again leaves none that is unusable beside it.
+                if let Some(after) = &after {
+                    let mut again = memory.clone();
+                    assert!(store(&mut again, after, usize::MAX, 0));
+                    let (in_use, slots) = found(&again);
+                    let sound = |slot: &Slot| matches!(slot, Slot::Empty | Slot::Whole { .. });
+                    assert!(
+                        in_use.as_ref() == Some(after) && slots.iter().all(sound),
+                        "{left} {tear}: {slots:?}"
+                    );
+                }
                 // And it can go on from there.
                 assert!(store(&mut memory, &third, usize::MAX, 0));
                 assert_eq!(found(&memory).0.as_ref(), Some(&third), "{left} {tear}");
