@@ -37,7 +37,7 @@ pub use batch::{
 pub use frame::{Decoder, EncodeError, Frame, MAX_FRAME, MAX_PAYLOAD, encode};
 pub use greeting::{
     Capabilities, Compatibility, EFFECTS, Greeting, MAGIC, PROTOCOL, Slot, Start, StoredInfo,
-    Version, compatibility, effects_of_this_build,
+    Version, WrongRegister, compatibility, effects_of_this_build,
 };
 pub use message::{
     CHUNK, Call, Counters, Event, KalmanAxis, KalmanState, Message, Prior, Refusal, Reply, Request,

@@ -5,7 +5,7 @@
 use core::future::Future;
 
 use mimu_core::PerSensor;
-use mimu_core::wire::{Counts, Triad};
+use mimu_core::wire::{Counts, Triad, WrongRegister};
 
 /// The line to the chip, and time.
 pub trait Bus {
@@ -29,8 +29,8 @@ pub struct BusFault;
 pub enum Problem {
     /// A transfer failed.
     Bus,
-    /// Another chip, or none: WHO_AM_I as it was read.
-    Identity(u8),
+    /// A register that does not read what it must: that of another chip or of none, or one that was not written.
+    Register(WrongRegister),
     /// What comes is no packet: its first byte.
     Packet(u8),
 }

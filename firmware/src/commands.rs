@@ -298,6 +298,9 @@ impl Commands<'_> {
             powered_for_ms: self.powered_for_ms,
             brown_out_level: Some(brown_out_level()),
             banks_swapped: banks_swapped(),
+            wrong_register: self.tally.wrong_register(),
+            nominal_hz: board::Source::TRIADS.gyro.rate_hz,
+            rate_measured: measured_hz.is_some(),
         };
         send(&mut self.replies, &Message::Greeting { id, greeting }).await;
     }

@@ -15,7 +15,7 @@ use mimu_core::compensation::Sample;
 use mimu_core::effects::REFERENCE_C;
 use mimu_core::wire::{Triad, flags};
 
-use crate::chip::{Bus, Chip, Packet, Part};
+use crate::chip::{Bus, Chip, Packet, Part, Problem};
 use crate::front_end::FrontEnd;
 use crate::lag::Lag;
 use crate::source::{Counts, Fault, Scan, Source, THERMOMETERS};
@@ -212,6 +212,7 @@ impl<C: Chip> Polled<C> {
         self.started_us.get_or_insert(now_us);
         let fault = match self.chip.start().await {
             Ok(()) => self.poll(&mut take).await,
+            Err(Problem::Register(wrong)) => Fault::Wrong(wrong),
             Err(_) => Fault::Stalled,
         };
         self.chip.bus().wait_us(PAUSE_US).await;

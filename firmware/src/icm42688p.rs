@@ -13,7 +13,7 @@
 //!   some milliseconds. The autopilots switch it off with the value 01, and so does this driver.
 
 use mimu_core::PerSensor;
-use mimu_core::wire::{Counts, Triad};
+use mimu_core::wire::{Counts, Triad, WrongRegister};
 
 use crate::chip::{Bus, BusFault, Chip, Packet, Part, Problem};
 use crate::design_parameters::{RADIANS, STANDARD_GRAVITY};
@@ -196,15 +196,16 @@ impl<B: Bus> Chip for Icm42688p<B> {
         self.bus.write(DEVICE_CONFIG, 1).await?;
         // 14.1: 1 ms.
         self.bus.wait_us(2_000).await;
-        let [identity] = self.registers(WHO_AM_I).await?;
-        if identity != IDENTITY {
-            return Err(Problem::Identity(identity));
-        }
+        self.check(WHO_AM_I, IDENTITY).await?;
         for (register, value) in SETTINGS {
             self.bus.write(register, value).await?;
         }
         // 14.36: no write for 200 µs; the gyro needs 30 ms to start (table 1), which are not sampled.
         self.bus.wait_us(50_000).await;
+        // Of other filters or ranges, no reading would be what the calibration belongs to.
+        for (register, value) in SETTINGS {
+            self.check(register, value).await?;
+        }
         // Stream: a full FIFO drops the oldest packet.
         self.bus.write(FIFO_CONFIG, 1 << 6).await?;
         self.bus.write(SIGNAL_PATH_RESET, 1 << 1).await?;
@@ -249,6 +250,20 @@ impl<B: Bus> Chip for Icm42688p<B> {
 }
 
 impl<B: Bus> Icm42688p<B> {
+    /// Whether `register` reads what it must.
+    async fn check(&mut self, register: u8, expected: u8) -> Result<(), Problem> {
+        let [found] = self.registers(register).await?;
+        match found == expected {
+            true => Ok(()),
+            false => Err(Problem::Register(WrongRegister {
+                register,
+                identifies: register == WHO_AM_I,
+                found,
+                expected,
+            })),
+        }
+    }
+
     async fn registers<const N: usize>(&mut self, first: u8) -> Result<[u8; N], BusFault> {
         let mut values = [0; N];
         self.bus.read(first, &mut values).await?;

@@ -151,7 +151,7 @@ async fn watch(
     before: &Before,
 ) -> ! {
     let mut due = Ticker::every(Duration::from_millis(design::WATCHDOG_FEED_MS));
-    let (mut last, mut rounds) = (0, 0);
+    let (mut last, mut rounds) = ([0; 2], 0);
     let mut transmitter = Overseer::new(design::rounds(design::TRANSMITTER_MS));
     let mut commands = Overseer::new(design::rounds(design::COMMAND_MS));
     loop {
@@ -160,13 +160,16 @@ async fn watch(
         assert!(cfg!(feature = "usb") || !transmitter.is_stuck(&TRANSMITTED));
         assert!(!commands.is_stuck(&ANSWERED));
         // Only samples count: a converter without samples is restarted again and again, which is not progress. A full queue means that
-        // nobody empties it.
-        let samples = TALLY.samples.load(Ordering::Relaxed);
-        if samples != last && !QUEUE.is_full() {
+        // nobody empties it. No restart remedies a missing sensor, which is asked again and again, and reported.
+        let now = [&TALLY.samples, &TALLY.wrong[0]].map(|c| c.load(Ordering::Relaxed));
+        if now != last && !QUEUE.is_full() {
             watchdog.pet();
             restart::keep_powered(powered_for_ms(before));
         }
-        last = samples;
+        if now[0] != last[0] {
+            TALLY.wrong[1].store(0, Ordering::Relaxed);
+        }
+        last = now;
         rounds += 1;
         if rounds % (1000 / design::WATCHDOG_FEED_MS) == 0 {
             let losses = pipeline.lock(|p| p.borrow().losses());

@@ -10,6 +10,7 @@ use embassy_stm32::interrupt::{InterruptExt, Priority};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::channel::Channel;
 use embassy_time::Instant;
+use mimu_core::wire::WrongRegister;
 
 use crate::board;
 use crate::design_parameters as design;
@@ -53,6 +54,8 @@ pub struct Tally {
     pub stalls: AtomicU32,
     /// Samples without room in the queue.
     pub queue_overruns: AtomicU32,
+    /// Starts of the sensor that found a register wrong, and the last one's register; 0 if none since the last sample.
+    pub wrong: [AtomicU32; 2],
     /// Longest time between a sample and the end of its processing, µs.
     pub longest_us: AtomicU32,
 }
@@ -67,9 +70,41 @@ impl Tally {
             converter_overruns: AtomicU32::new(0),
             stalls: AtomicU32::new(0),
             queue_overruns: AtomicU32::new(0),
+            wrong: [const { AtomicU32::new(0) }; 2],
             longest_us: AtomicU32::new(0),
         }
     }
+}
+
+impl Tally {
+    /// The sensor was started, and a register is wrong.
+    fn found_wrong(&self, wrong: WrongRegister) {
+        let WrongRegister {
+            register,
+            identifies,
+            found,
+            expected,
+        } = wrong;
+        let bytes = [1 | u8::from(identifies) << 1, register, found, expected];
+        self.wrong[1].store(u32::from_be_bytes(bytes), Ordering::Relaxed);
+        self.wrong[0].fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// The register that is wrong since the last sample.
+    pub fn wrong_register(&self) -> Option<WrongRegister> {
+        let [kind, register, found, expected] = self.wrong[1].load(Ordering::Relaxed).to_be_bytes();
+        (kind > 0).then_some(WrongRegister {
+            register,
+            identifies: kind & 2 != 0,
+            found,
+            expected,
+        })
+    }
+}
+
+/// Lets these interrupts of the line to the host wait for sampling, which the drivers leave above it.
+pub fn goes_before(line: &[interrupt::Interrupt]) {
+    line.iter().for_each(|one| one.set_priority(Priority::P2));
 }
 
 /// Runs the task, from an interrupt.
@@ -110,6 +145,10 @@ async fn sample(mut sensors: board::Acquisition) {
             Fault::Late => &TALLY.late,
             Fault::Overrun => &TALLY.converter_overruns,
             Fault::Stalled => &TALLY.stalls,
+            Fault::Wrong(wrong) => {
+                TALLY.found_wrong(wrong);
+                &TALLY.stalls
+            }
         };
         counter.fetch_add(1, Ordering::Relaxed);
     }

@@ -13,7 +13,7 @@ use heapless::Vec;
 use mimu_core::PerSensor;
 use mimu_core::compensation::Sample;
 use mimu_core::stored::{self, Stored, StoredError};
-use mimu_core::wire::Triad;
+use mimu_core::wire::{Triad, WrongRegister};
 
 use crate::board;
 use crate::front_end::FrontEnd;
@@ -49,7 +49,6 @@ pub fn usable(bytes: &[u8]) -> Result<Stored, StoredError> {
 
 /// Why a source had to begin anew. Samples were lost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(target_os = "none", derive(defmt::Format))]
 pub enum Fault {
     /// The reader was late: the sample was being overwritten.
     Late,
@@ -57,6 +56,8 @@ pub enum Fault {
     Overrun,
     /// No data, and no flag that gives the reason.
     Stalled,
+    /// The sensor is missing, another one, or set otherwise than it must be.
+    Wrong(WrongRegister),
 }
 
 /// The meaning of a source's integers, followed batch by batch.

@@ -13,7 +13,7 @@ use crate::triad::Triad;
 pub const MAGIC: [u8; 4] = *b"mimu";
 
 /// The protocol of this build.
-pub const PROTOCOL: Version = Version { major: 3, minor: 1 };
+pub const PROTOCOL: Version = Version { major: 3, minor: 2 };
 
 /// Version of a protocol.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
@@ -68,6 +68,25 @@ pub struct Greeting<'a> {
     pub brown_out_level: Option<u8>,
     /// Whether the banks of its flash have exchanged their addresses, so that it cannot store. From 3.1 on.
     pub banks_swapped: bool,
+    /// Register of the digital sensor that reads otherwise than it must, so that nothing is sampled. From 3.2 on.
+    pub wrong_register: Option<WrongRegister>,
+    /// Samples per second by the data sheet, of which a digital sensor's own clock differs. From 3.2 on.
+    pub nominal_hz: f32,
+    /// Whether the rate of the triads is measured by the crystal. From 3.2 on; before the first samples it is the nominal one.
+    pub rate_measured: bool,
+}
+
+/// A register of a digital sensor that does not read what it must.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct WrongRegister {
+    /// Its address.
+    pub register: u8,
+    /// Whether it identifies the part: the sensor is missing, or another one.
+    pub identifies: bool,
+    /// What it reads.
+    pub found: u8,
+    /// What it must read.
+    pub expected: u8,
 }
 
 /// Bits of [`Greeting::capabilities`].

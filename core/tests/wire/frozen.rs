@@ -8,7 +8,7 @@ use mimu_core::PerSensor;
 use mimu_core::wire::{
     Capabilities, Compatibility, Counters, Decoder, EFFECTS, Event, Greeting, MAGIC, Message,
     Refusal, Reply, SelfTest, Slot, Start, StoredInfo, TestRow, Triad, Verdict, Version,
-    compatibility,
+    WrongRegister, compatibility,
 };
 
 /// A device's greeting.
@@ -21,11 +21,11 @@ const GREETING_SHORTER: &str = "000107076d696d75033f0d302e312e302d31613262336334
      03081080200841445852533330300156120103a840010320400103903e01167a4405343020487a094d4d4137323630515401561201036c \
      410103d43f0103a03d01217a4407312e36206b487a146779726f5f782c6779726f5f792c6779726f5f7a01250301b802ef9bafcdf8acd1 \
      910101020102030405060708090a0b0c80f2d6ca0601b6adff00";
-/// The same with the fields of 3.1, and additional bytes at the end.
-const GREETING_LONGER: &str = "000107076d696d75033f0d302e312e302d316132623363340e4e55434c454f2d483734335a49320102030405060708090a0b0c0fffffff \
-     03081080200841445852533330300156120103a840010320400103903e01167a4405343020487a094d4d4137323630515401561201036c \
-     410103d43f0103a03d01217a4407312e36206b487a146779726f5f782c6779726f5f792c6779726f5f7a01250301b802ef9bafcdf8acd1 \
-     910101020102030405060708090a0b0c80f2d6ca0602010501010301030b2a04746578746603e1bf00";
+/// The same with the fields of 3.2, and additional bytes at the end.
+const GREETING_LONGER: &str = "000107076d696d75033f0d302e312e302d316132623363340e4e55434c454f2d483734335a49320102030405060708090a0b0c0fffff \
+     ff03081080200841445852533330300156120103a840010320400103903e01167a4405343020487a094d4d4137323630515401561201 \
+     036c410103d43f0103a03d01217a4407312e36206b487a146779726f5f782c6779726f5f792c6779726f5f7a01250301b802ef9bafcd \
+     f8acd1910101020102030405060708090a0b0c80f2d6ca060201050101030103040175010247010e7a44012a04746578747421f91f00";
 /// The same with a start reason of a later version, number 19, with five bytes.
 const UNKNOWN_START: &str = "000107076d696d75033f0d302e312e302d316132623363340e4e55434c454f2d483734335a49320102030405060708090a0b0c0fffffff \
      03081080200841445852533330300156120103a840010320400103903e01167a4405343020487a094d4d4137323630515401561201036c \
@@ -170,6 +170,14 @@ fn what_a_greeting_lacks_is_unknown() {
 fn what_a_greeting_has_beyond_is_not_looked_at() {
     let expected = Greeting {
         brown_out_level: Some(3),
+        wrong_register: Some(WrongRegister {
+            register: 0x75,
+            identifies: true,
+            found: 0,
+            expected: 0x47,
+        }),
+        nominal_hz: 1000.0,
+        rate_measured: true,
         ..greeting()
     };
     greets(GREETING_LONGER, &expected);

@@ -5,7 +5,7 @@ use mimu_core::stored;
 use mimu_core::wire::{
     BatchHead, Call, Capabilities, CompensatedBatch, Counters, Counts, Event, Frame, Greeting,
     KalmanAxis, KalmanState, MAGIC, Message, Prior, RawBatch, Refusal, Reply, Request, Slot, Start,
-    StoredInfo, TestRow, TestTable, Triad, Version, flags,
+    StoredInfo, TestRow, TestTable, Triad, Version, WrongRegister, flags,
 };
 use mimu_core::{PerSensor, Sensor};
 use serde::{Deserialize, Serialize};
@@ -117,7 +117,7 @@ fn greeting<'a>(start: Start<'a>, stored: Option<StoredInfo>, slots: [Slot; 2]) 
         id: 1,
         greeting: Greeting {
             magic: MAGIC,
-            protocol: Version { major: 3, minor: 1 },
+            protocol: Version { major: 3, minor: 2 },
             firmware: "0.1.0",
             board: "B",
             unit_id: [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12],
@@ -147,6 +147,14 @@ fn greeting<'a>(start: Start<'a>, stored: Option<StoredInfo>, slots: [Slot; 2]) 
             powered_for_ms: Some(300),
             brown_out_level: Some(2),
             banks_swapped: true,
+            wrong_register: Some(WrongRegister {
+                register: 0x75,
+                identifies: true,
+                found: 0,
+                expected: 0x47,
+            }),
+            nominal_hz: 1000.0,
+            rate_measured: true,
         },
     }
 }
@@ -156,7 +164,7 @@ const SENSORS: &str = "01 47 05 636f756e74 13 0000003f 000000c0 0000803f 00007a4
                        00 00 00 00000000 00000000 00000000 00000000 00 03 646965";
 
 /// A greeting up to the sensors. 0xfffff in groups of seven bits is 7f 7f 3f; 4096 is 32 * 128.
-const BEFORE: &str = "00 01 6d696d75 03 01 05 302e312e30 01 42 0102030405060708090a0b0c \
+const BEFORE: &str = "00 01 6d696d75 03 02 05 302e312e30 01 42 0102030405060708090a0b0c \
                       1f ffff3f 08 10 8020";
 
 #[test]
@@ -178,7 +186,7 @@ fn greetings() {
         (Start::Other, "01 06"),
     ] {
         let bytes = hex(&format!(
-            "{BEFORE} {SENSORS} {bytes} 03 00 0100 0100 01 ac02 01 02 01"
+            "{BEFORE} {SENSORS} {bytes} 03 00 0100 0100 01 ac02 01 02 01 01 75 01 00 47 00007a44 01"
         ));
         frozen(greeting(start, None, none), &bytes);
     }
@@ -198,7 +206,7 @@ fn greetings() {
         (Slot::NotUsable(stored::StoredError::Check), "02 04 03"),
     ] {
         let bytes = hex(&format!(
-            "{BEFORE} {SENSORS} 01 00 03 01 ac02 ffffffffffffffffff01 05 02 {} ac02 {bytes} 01 00 01 ac02 01 02 01",
+            "{BEFORE} {SENSORS} 01 00 03 01 ac02 ffffffffffffffffff01 05 02 {} ac02 {bytes} 01 00 01 ac02 01 02 01 01 75 01 00 47 00007a44 01",
             "ab".repeat(12)
         ));
         frozen(

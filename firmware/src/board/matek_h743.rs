@@ -48,7 +48,7 @@ mod parts {
     use embassy_stm32::spi::{self, MODE_0, Spi};
     use embassy_stm32::time::Hertz;
     use embassy_stm32::wdg::IndependentWatchdog;
-    use embassy_stm32::{bind_interrupts, dma};
+    use embassy_stm32::{bind_interrupts, dma, interrupt};
     #[cfg(not(feature = "usb"))]
     use embassy_stm32::{mode::Async, usart};
 
@@ -56,6 +56,7 @@ mod parts {
     use crate::board::clocks;
     use crate::digital::{Controls, Polled};
     use crate::front_end::FrontEnd;
+    use crate::sampling;
     use crate::spi::Line;
 
     bind_interrupts!(
@@ -133,7 +134,7 @@ mod parts {
             let (tx, rx) = (p.DMA1_CH3, p.DMA1_CH4);
             let bus = Spi::new(p.SPI1, p.PA5, p.PD7, p.PA6, tx, rx, Irqs, config);
             let select = Output::new(p.PC15, Level::High, Speed::VeryHigh);
-            Self {
+            let board = Self {
                 sensors: Sensors(Line::new(bus, select)),
                 self_test: SelfTest(&CONTROLS),
                 #[cfg(not(feature = "usb"))]
@@ -152,7 +153,16 @@ mod parts {
                     dm: p.PA11,
                 },
                 watchdog,
-            }
+            };
+            #[cfg(not(feature = "usb"))]
+            sampling::goes_before(&[
+                interrupt::UART7,
+                interrupt::DMA1_STREAM1,
+                interrupt::DMA1_STREAM2,
+            ]);
+            #[cfg(feature = "usb")]
+            sampling::goes_before(&[interrupt::OTG_FS]);
+            board
         }
     }
 }

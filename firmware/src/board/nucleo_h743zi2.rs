@@ -74,7 +74,7 @@ mod parts {
     use embassy_stm32::peripherals::{self, ADC1, DMA1_CH0, IWDG1};
     use embassy_stm32::rcc::HseMode;
     use embassy_stm32::wdg::IndependentWatchdog;
-    use embassy_stm32::{Peri, bind_interrupts, dma};
+    use embassy_stm32::{Peri, bind_interrupts, dma, interrupt};
     #[cfg(not(feature = "usb"))]
     use embassy_stm32::{mode::Async, usart};
 
@@ -86,6 +86,7 @@ mod parts {
     use crate::board::clocks;
     use crate::channels::Channels;
     use crate::front_end::FrontEnd;
+    use crate::sampling;
     use crate::supply::Supply;
 
     bind_interrupts!(
@@ -181,7 +182,7 @@ mod parts {
             let p = clocks::begin(HseMode::Bypass);
             let watchdog = clocks::watch(p.IWDG1);
             let low = |pin: Peri<'static, AnyPin>| Output::new(pin, Level::Low, Speed::Low);
-            Self {
+            let board = Self {
                 sensors: Sensors {
                     adc: p.ADC1,
                     dma: p.DMA1_CH0,
@@ -226,7 +227,16 @@ mod parts {
                     dm: p.PA11,
                 },
                 watchdog,
-            }
+            };
+            #[cfg(not(feature = "usb"))]
+            sampling::goes_before(&[
+                interrupt::USART3,
+                interrupt::DMA1_STREAM1,
+                interrupt::DMA1_STREAM2,
+            ]);
+            #[cfg(feature = "usb")]
+            sampling::goes_before(&[interrupt::OTG_FS]);
+            board
         }
     }
 }

@@ -19,9 +19,12 @@ struct OwnClock {
     bank: u8,
     /// Period of its samples in the crystal's time, µs.
     period_us: f64,
-    /// Samples made so far, and since when it runs, µs.
+    /// Relative change of the period in a second: the oscillator drifts with the temperature of the die.
+    drift: f64,
+    /// Samples made so far, and since when it runs and when the next one is made, µs.
     made: u64,
     on_us: Option<f64>,
+    next_us: f64,
     fifo: VecDeque<u8>,
     now_us: f64,
     /// From and to when waiting takes to the end of it: the reader is starved.
@@ -39,8 +42,10 @@ impl OwnClock {
             registers: [0; 128],
             bank: 0,
             period_us: 1000.0 * (1.0 + error),
+            drift: 0.0,
             made: 0,
             on_us: None,
+            next_us: 0.0,
             fifo: VecDeque::new(),
             now_us: 7_000.0,
             starved_us: None,
@@ -53,8 +58,10 @@ impl OwnClock {
     /// Each sample has its own number in the accelerometer.
     fn catch_up(&mut self) {
         let Some(on_us) = self.on_us else { return };
-        while on_us + (self.made + 1) as f64 * self.period_us <= self.now_us {
+        while self.next_us <= self.now_us {
             self.made += 1;
+            let changed = self.drift * (self.next_us - on_us) * 1e-6;
+            self.next_us += self.period_us * (1.0 + changed);
             let number = self.made as i32;
             // 30 counts in 32 µs of the chip's clock, 16 in a step.
             let stamp = (self.made * 1000 * 30 / 32 / 16 % 65_536) as u16;
@@ -99,6 +106,7 @@ impl Bus for OwnClock {
                 (0, 0x2e, 0) => length[0],
                 (0, 0x2e, 1) => length[1],
                 (0, 0x75, 0) => 0x47,
+                (0, register, _) => self.registers[usize::from(register)],
                 _ => 0,
             };
         }
@@ -109,15 +117,18 @@ impl Bus for OwnClock {
     async fn write(&mut self, register: u8, value: u8) -> Result<(), BusFault> {
         self.answers()?;
         self.now_us += 2.0;
+        self.registers[usize::from(register)] = value;
         match (register, value) {
             (0x76, bank) => self.bank = bank,
             (0x11, 1) => (self.on_us, self.made) = (None, 0),
-            (0x4e, 0x0f) => self.on_us = Some(self.now_us),
+            (0x4e, 0x0f) => {
+                (self.on_us, self.next_us) = (Some(self.now_us), self.now_us + self.period_us);
+            }
             (0x4b, 0x02) => {
                 self.catch_up();
                 self.fifo.clear();
             }
-            _ => self.registers[usize::from(register)] = value,
+            _ => {}
         }
         Ok(())
     }
@@ -172,6 +183,39 @@ fn every_sample_comes_once_with_its_time_by_the_crystal_however_wrong_the_chip_s
             (period_ns / period_us - 1000.0).abs() < 0.01,
             "{error}: {period_ns}"
         );
+    }
+}
+
+#[test]
+fn a_chip_whose_clock_drifts_by_a_tenth_of_a_per_cent_keeps_the_crystal_s_time() {
+    // In two minutes, as the die warms by 20 K, and twice as fast the other way.
+    for (drift, error) in [(1e-3 / 120.0, 0.0077), (-1e-3 / 60.0, -0.004)] {
+        let mut chip = OwnClock::new(error, 120e6);
+        chip.drift = drift;
+        let (all, polled) = scans(chip);
+        let on_us = polled.chip.bus.on_us.unwrap();
+        // The times that the chip's samples were made at, summed up independently.
+        let mut made_us = std::vec![on_us];
+        while made_us.len() < all.len() + 1_000 {
+            let last = made_us[made_us.len() - 1];
+            let since_s = (last - on_us) * 1e-6;
+            let since_s = if made_us.len() == 1 { 0.0 } else { since_s };
+            made_us.push(last + 1000.0 * (1.0 + error) * (1.0 + drift * since_s));
+        }
+        let period_us = |k: usize| made_us[k + 1] - made_us[k];
+        // A filter of level and slope with the gains of a line over n samples lags behind a slope that changes: by change n² / 6 in level and change 2 n / 3 in
+        // slope. With n = 10 000 samples of a millisecond these are 16.7 s² and 6.7 s.
+        let (level_us, slope) = (16.7e6 * drift.abs(), 6.7 * drift.abs());
+        for scan in all.iter().skip(20_000) {
+            let k = scan.counts.accel[0] as usize;
+            let off_us = scan.tick_us as f64 + 7_000.0 - made_us[k];
+            assert!(
+                off_us.abs() < 1.2 * level_us + 40.0,
+                "{drift} {k}: {off_us}"
+            );
+            let off = f64::from(scan.period_ns) * 1e-3 / period_us(k) - 1.0;
+            assert!(off.abs() < 1.2 * slope + 20e-6, "{drift} {k}: {off:e}");
+        }
     }
 }
 

@@ -16,6 +16,8 @@ struct Registers {
     bank: usize,
     fifo: VecDeque<u8>,
     writes: Vec<(usize, u8, u8)>,
+    /// A register of bank 0 that reads this, whatever is written.
+    fixed: Option<(u8, u8)>,
     us: u64,
 }
 
@@ -28,6 +30,7 @@ impl Registers {
             bank: 0,
             fifo: VecDeque::new(),
             writes: Vec::new(),
+            fixed: None,
             us: 0,
         }
     }
@@ -43,6 +46,9 @@ impl Bus for Registers {
                 (0, 0x2e) => length[0],
                 (0, 0x2f) => length[1],
                 (0, 0x30) => self.fifo.pop_front().unwrap_or(0xff),
+                (0, at) if self.fixed.is_some_and(|(fixed, _)| fixed == at) => {
+                    self.fixed.map_or(0, |(_, value)| value)
+                }
                 _ => self.banks[self.bank][usize::from(at)],
             };
             // A burst stays at the FIFO's port.
@@ -167,8 +173,21 @@ fn it_starts_only_the_chip_that_it_knows_and_leaves_it_as_set() {
     let at = |register| writes.iter().position(|r| *r == register).unwrap();
     assert!(at(DEVICE_CONFIG) < at(PWR_MGMT0) && at(PWR_MGMT0) < at(FIFO_CONFIG));
 
-    chip.bus.banks[0][usize::from(WHO_AM_I)] = 0x42;
-    assert_eq!(block_on(chip.start()), Err(Problem::Identity(0x42)));
+    let wrong = |register, identifies, found, expected| {
+        Err(Problem::Register(WrongRegister {
+            register,
+            identifies,
+            found,
+            expected,
+        }))
+    };
+    chip.bus.fixed = Some((ACCEL_CONFIG1, 0x05));
+    assert_eq!(
+        block_on(chip.start()),
+        wrong(ACCEL_CONFIG1, false, 0x05, 0x0d)
+    );
+    chip.bus.fixed = Some((WHO_AM_I, 0x42));
+    assert_eq!(block_on(chip.start()), wrong(WHO_AM_I, true, 0x42, 0x47));
 }
 
 #[test]

@@ -7,7 +7,7 @@ use serde::{Serialize, Serializer};
 use mimu_core::compensation::Affine;
 use mimu_core::wire::{
     Capabilities, Compatibility, EFFECTS, Greeting, MAGIC, PROTOCOL, Slot, Start, Triad, Version,
-    compatibility,
+    WrongRegister, compatibility,
 };
 use nalgebra::{Matrix3, Vector3};
 
@@ -57,6 +57,12 @@ pub struct Identity {
     pub brown_out_level: Option<u8>,
     /// Whether the banks of its flash are swapped, so that it stores nothing.
     pub banks_swapped: bool,
+    /// Register of the sensor that reads otherwise than it must, so that the device does not sample; `None` if there is none.
+    pub wrong_register: Option<WrongRegister>,
+    /// Samples per second by the data sheet; `None` if the device does not tell.
+    pub nominal_rate_hz: Option<f64>,
+    /// Whether [`Self::sample_rate_hz`] is measured; an older device does not tell, and counts as one that has.
+    pub rate_measured: bool,
     /// Sentences: if the device is older or newer but compatible, on the places of its calibrations, if it cannot store.
     pub warnings: Vec<String>,
 }
@@ -267,10 +273,15 @@ impl From<&Greeting<'_>> for Identity {
             powered_for_ms: greeting.powered_for_ms,
             brown_out_level: greeting.brown_out_level,
             banks_swapped: greeting.banks_swapped,
+            wrong_register: greeting.wrong_register,
+            nominal_rate_hz: nominal_hz(greeting),
+            rate_measured: greeting.rate_measured || nominal_hz(greeting).is_none(),
             warnings: version_warning(greeting.protocol)
                 .into_iter()
                 .chain(slot_warnings(&greeting.slots))
                 .chain(greeting.banks_swapped.then(|| SWAPPED.to_owned()))
+                .chain(wrong_register(greeting))
+                .chain(clock_off(greeting))
                 .collect(),
         }
     }
@@ -334,6 +345,43 @@ fn names(of: Capabilities) -> impl Iterator<Item = &'static str> {
 
 /// Warning about an option byte.
 const SWAPPED: &str = "the banks of the microcontroller's flash are swapped (option byte SWAP_BANK_OPT): it stores no calibration until a debugger clears it";
+
+fn nominal_hz(greeting: &Greeting) -> Option<f64> {
+    Some(shortest(greeting.nominal_hz)).filter(|hz| *hz > 0.0)
+}
+
+/// The firmware follows a sensor's clock by up to 5 %.
+const FOLLOWED: f64 = 0.0495;
+
+/// A sensor whose clock is further off than the device follows.
+fn clock_off(greeting: &Greeting) -> Option<String> {
+    let nominal = nominal_hz(greeting)?;
+    let rate = shortest(greeting.triads.gyro.rate_hz);
+    let off = nominal / rate - 1.0;
+    (off.abs() > FOLLOWED).then(|| format!(
+        "the sensor's clock is off by 5 % or more of its {nominal} Hz, which the device does not follow: times and rates are wrong; replace the sensor, or the board if its crystal is another one than the firmware's"
+    ))
+}
+
+/// Why a digital sensor is not sampled.
+fn wrong_register(greeting: &Greeting) -> Option<String> {
+    let WrongRegister {
+        register,
+        identifies,
+        found,
+        expected,
+    } = greeting.wrong_register?;
+    let part = greeting.triads.gyro.part;
+    let read = format!("reads {found:#04x}, and {expected:#04x} was expected");
+    Some(match identifies {
+        true => format!(
+            "no samples: WHO_AM_I {read}: the {part} is missing, or another part is in its place; check the sensor and its wires"
+        ),
+        false => format!(
+            "no samples: register {register:#04x} of the {part} {read} as it was written; check the wires to the sensor"
+        ),
+    })
+}
 
 fn version_warning(device: Version) -> Option<String> {
     let versions = versions(device);

@@ -9,6 +9,7 @@ use mimu::quantity::{AXES, PerSensor};
 use mimu_core::wire::Request;
 use serde::Serialize;
 
+use super::identity::TriadInfo;
 use super::received::Answer;
 use super::session::Session;
 use super::stream::{Moments, Stream, Streamed, stream};
@@ -24,6 +25,10 @@ const LOOK: Duration = Duration::from_millis(250);
 const STILL_GYRO: f64 = 0.07;
 /// The same limit for the accelerometer, m/s²: 50 mg, or a tilt by 3 degrees. The noise of an MMA7260QT is 6 mg; its test's threshold is 190 mg.
 const STILL_ACCEL: f64 = 0.49;
+
+/// Rates that no sound gyro reads at rest, deg/s: twice the offset of an analog part (ADXRS300: its null is within 0.2 V, 40 deg/s) and ten times that of a
+/// digital one (ICM-42688-P: 0.5 deg/s, DS-000347, table 1).
+const OFFSETS_DPS: [f64; 2] = [80.0, 5.0];
 
 /// Result of `mimu device self-test`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -56,18 +61,38 @@ pub fn self_test(session: &mut Session) -> Result<SelfTested> {
         accel: STILL_ACCEL,
     });
     let limits = limits.map(|(sensors, limit)| limit * sensors.per_si.abs());
+    let moved = moved(
+        [&before.gyro, &before.accel],
+        [&after.gyro, &after.accel],
+        limits,
+    );
     Ok(SelfTested {
         results: test,
-        moved: moved(
-            [&before.gyro, &before.accel],
-            [&after.gyro, &after.accel],
-            limits,
-        ),
+        moved: moved.or_else(|| turned(&before.gyro, &session.who().sensors.gyro)),
     })
 }
 
 fn look(session: &mut Session) -> Result<Streamed> {
     stream(session, Stream::Raw, Some(LOOK), || false, |_, _, _| Ok(()))
+}
+
+/// Describes an even turn: a rate that exceeds what the part's data sheet allows at rest.
+fn turned(seen: &Moments, gyro: &TriadInfo) -> Option<String> {
+    let at_rest = match gyro.unit.as_str() {
+        "V" => OFFSETS_DPS[0],
+        _ => OFFSETS_DPS[1],
+    };
+    let rates = seen
+        .mean
+        .map(|mean| ((mean - gyro.null) / gyro.per_si).to_degrees());
+    let fastest = AXES
+        .iter()
+        .zip(rates)
+        .max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
+    let (axis, rate) = fastest.filter(|(_, rate)| rate.abs() > at_rest)?;
+    Some(format!(
+        "it turned at {rate:.1} deg/s about {axis} before the test and after it"
+    ))
 }
 
 /// Describes the largest motion between `before` and `after` (gyro and accelerometer, raw units), if it exceeds the limits.
@@ -114,6 +139,34 @@ mod tests {
             mean,
             deviation: [deviation; 3],
         })
+    }
+
+    #[test]
+    fn an_even_turn_is_named_and_an_offset_at_rest_is_not() {
+        let gyro = TriadInfo {
+            part: "ICM-42688-P".into(),
+            unit: "count".into(),
+            bits: 19,
+            range: 34.9,
+            null: 0.0,
+            // 131.072 counts per deg/s.
+            per_si: 131.072 * 57.295_779_5,
+            filter: String::new(),
+        };
+        let at = |dps: f64| {
+            let mean = [0.0, -0.4, dps].map(|dps| 131.072 * dps);
+            let unit = "count".into();
+            turned(
+                &Moments {
+                    unit,
+                    mean,
+                    deviation: [5.0; 3],
+                },
+                &gyro,
+            )
+        };
+        assert_eq!(at(3.0), None);
+        assert!(at(-10.0).unwrap().contains("-10.0 deg/s about z"));
     }
 
     #[test]

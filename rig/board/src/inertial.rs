@@ -113,6 +113,15 @@ impl SelfTest {
     }
 }
 
+/// Another part in place of the chip, or none: what a register, or each one, reads whatever was written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Other {
+    /// The register; `None`: all of them.
+    pub register: Option<u8>,
+    /// What it reads.
+    pub reads: u8,
+}
+
 /// What is sensed at a time, ns by the board's crystal. Times do not decrease.
 pub type Feed = Box<dyn FnMut(u64) -> Sensed + Send>;
 
@@ -123,6 +132,8 @@ pub(crate) struct Inertial {
     /// The board's crystal relative to its nominal frequency: virtual time is the chip's, and the bench's is the crystal's.
     crystal: f64,
     selected: bool,
+    /// What answers in place of it.
+    pub(crate) other: Option<Other>,
     self_test: SelfTest,
     /// The next update of the grid, and its time, ns.
     due: Option<(EventId, u64)>,
@@ -141,6 +152,7 @@ impl Inertial {
             feed,
             crystal,
             selected: false,
+            other: None,
             self_test: SelfTest::default(),
             due: None,
         }
@@ -198,7 +210,13 @@ impl Peer for Inertial {
 
     fn transfer(&mut self, mosi: u32, bits: u8, context: &mut Timeline<'_, '_>) -> u32 {
         let answer = self.chip.transfer(mosi, bits, context);
-        self.self_test.byte(mosi as u8).map_or(answer, u32::from)
+        let read = self.self_test.address.filter(|address| address & 0x80 != 0);
+        let other = self.other.filter(|other| {
+            read.is_some_and(|read| other.register.is_none_or(|r| r == read & 0x7f))
+        });
+        let of_test = self.self_test.byte(mosi as u8);
+        let answered = other.map(|other| other.reads).or(of_test);
+        answered.map_or(answer, u32::from)
     }
 
     fn on_event(&mut self, event: EventId, context: &mut Timeline<'_, '_>) {

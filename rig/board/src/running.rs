@@ -15,7 +15,7 @@ use crate::findings::{Findings, findings};
 use crate::flash::{BANK, BASE, Operation};
 use crate::front::Front;
 use crate::image::Image;
-use crate::inertial::{Feed, Inertial};
+use crate::inertial::{Feed, Inertial, Other, Sensed};
 use crate::line::{FarEnd, Line};
 use crate::memory::{program, read};
 use crate::part::{Machine, Wiring};
@@ -88,6 +88,21 @@ impl Board {
         let sensor = Inertial::new(feed, crystal);
         let front = Front::Still(Volts::GROUND);
         Self::wired(image, front, Some(sensor), Wiring::matek(crystal), unit_id)
+    }
+
+    /// The Matek H743 whose sensor answers otherwise than its own: another part, or none.
+    ///
+    /// Errors: as [`Board::new`].
+    pub fn other_sensor(image: &Image, other: Other, unit_id: [u8; 12]) -> Result<Self, String> {
+        let still = Sensed {
+            rate_dps: [0.0; 3],
+            force_g: [0.0, 0.0, 1.0],
+            die_c: 25.0,
+        };
+        let mut sensor = Inertial::new(Box::new(move |_| still), 1.0);
+        sensor.other = Some(other);
+        let front = Front::Still(Volts::GROUND);
+        Self::wired(image, front, Some(sensor), Wiring::matek(1.0), unit_id)
     }
 
     /// The Matek H743 with the unit of [`Front::digital`] or [`Front::commanded_digital`]: its sensor senses what the unit does, with the unit's

@@ -45,8 +45,15 @@ pub fn info_text(result: &DeviceResult<&Identity>) -> String {
     }
     line!(
         out,
-        "samples       {} Hz, 6 channels in {}",
+        "samples       {} Hz{}, 6 channels in {}",
         who.sample_rate_hz,
+        match (who.rate_measured, who.nominal_rate_hz) {
+            (false, _) => " nominal, not measured yet".into(),
+            (true, Some(nominal)) if nominal != who.sample_rate_hz => {
+                format!(" measured, {nominal} nominal")
+            }
+            _ => String::new(),
+        },
         who.raw_unit
     );
     for (sensor, triad) in who.sensors.iter() {

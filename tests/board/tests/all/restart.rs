@@ -3,10 +3,13 @@
 //! The faults replace an instruction while the program runs, and are removed as soon as it has restarted.
 
 use mimu_board::fault::Fault;
+use mimu_board::inertial::Other;
 use mimu_board::running::Board;
 use mimu_board::schematic::Volts;
-use mimu_board_tests::{MS, STARTED, image, still};
-use mimu_core::wire::{Call, Decoder, Greeting, MAX_FRAME, Message, Request, Start, encode};
+use mimu_board_tests::{MS, STARTED, digital_image, image, still};
+use mimu_core::wire::{
+    Call, Decoder, Greeting, MAX_FRAME, Message, Request, Start, WrongRegister, encode,
+};
 
 /// The start as reported in a greeting.
 #[derive(Debug)]
@@ -254,6 +257,33 @@ fn a_command_that_waits_for_ever_restarts_the_device() {
         "{cause} after {ms} ms"
     );
     assert!(greeted.start.contains("main.rs"), "{}", greeted.start);
+}
+
+#[test]
+fn without_its_sensor_or_with_another_one_the_device_stays_up_and_says_what_it_reads() {
+    // None on the line; an ICM-42686-P; the accelerometer's filter as after a write that was lost.
+    for (register, reads, wrong) in [
+        (None, 0x00, (0x75, 0x47)),
+        (Some(0x75), 0x44, (0x75, 0x47)),
+        (Some(0x53), 0x05, (0x53, 0x0d)),
+    ] {
+        let other = Other { register, reads };
+        let mut board = Board::other_sensor(&digital_image(), other, [7; 12]).unwrap();
+        let early = greeted(&mut board, |g| g.rate_measured);
+        board.run_for(8_000 * MS).unwrap();
+        board.receive();
+        board.send(&call(Request::Hello));
+        let (starts, found) = greeted(&mut board, |g| (g.starts, g.wrong_register));
+        let (register, expected) = wrong;
+        let told = WrongRegister {
+            register,
+            identifies: register == 0x75,
+            found: reads,
+            expected,
+        };
+        assert_eq!((starts, found, early), (1, Some(told), false));
+        assert_eq!(bites(&mut board), 0);
+    }
 }
 
 /// A call as the host sends it.

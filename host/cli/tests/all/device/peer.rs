@@ -12,6 +12,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use mimu_core::PerSensor;
+use mimu_core::wire::WrongRegister;
 use mimu_core::wire::{
     Decoder, MAGIC, MAX_FRAME, Message, PROTOCOL, Refusal, Reply, Start, Triad, Version,
     effects_of_this_build, encode,
@@ -119,6 +120,8 @@ pub struct Script {
     pub link: Option<PathBuf>,
     /// Time since power-on at its first sample.
     pub powered_for_ms: Option<u32>,
+    /// Register of its sensor that is wrong.
+    pub wrong_register: Option<WrongRegister>,
     /// Flags of all its batches.
     pub flags: u16,
 }
@@ -148,6 +151,7 @@ impl Default for Script {
             bent: 0.0,
             self_test_fails: &[],
             powered_for_ms: Some(0),
+            wrong_register: None,
             flags: 0,
             start: Start::Panic {
                 file: "src/x.rs",

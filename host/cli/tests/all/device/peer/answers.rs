@@ -57,6 +57,9 @@ impl Device {
             powered_for_ms: self.script.powered_for_ms,
             brown_out_level: Some(3),
             banks_swapped: false,
+            wrong_register: self.script.wrong_register,
+            nominal_hz: self.script.triads.gyro.rate_hz,
+            rate_measured: true,
         };
         let message = Message::Greeting { id, greeting };
         match id {
