@@ -75,7 +75,7 @@ fn run(sensor: Sensor, filtered: bool, seed: u64) -> Vec<Errors> {
     let s = sensor as usize;
     let truth: Ideal = table_4()[s].forward(ideal::Angles::Linear, [0.0; 3]);
     let positions = Scheme::FangNine.settings(Sensor::Accel).expect("poses");
-    let mut random = Random::new(seed, "fang convergence");
+    let mut random = Random::new(seed, &format!("fang convergence, {sensor}"));
     let mut out = vec![Errors::default(); READINGS];
     let mut found = vec![
         Forward {

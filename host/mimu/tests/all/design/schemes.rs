@@ -200,12 +200,30 @@ fn products_cannot_be_told_apart_by_the_size_of_gravity() {
 #[test]
 fn niu_and_xu_positions_are_as_published() {
     let xu = Scheme::Xu33.settings(Sensor::Accel).unwrap();
-    // Appendix: F_x(7) = [g sin 30°, 0, -g cos 30°], F_y(10) = [-g cos 75°, g sin 75°, 0].
-    let (s, c) = (30_f64.to_radians().sin(), 30_f64.to_radians().cos());
-    assert!((xu[6].up - Vector3::new(s, 0.0, -c)).norm() < 1e-12);
-    let (s, c) = (75_f64.to_radians().sin(), 75_f64.to_radians().cos());
-    assert!((xu[20].up - Vector3::new(-c, s, 0.0)).norm() < 1e-12);
-    assert_eq!(xu.len(), 33);
+    // Appendix, F_x(1) to F_z(11) in units of g: rows 2 to 5 with the first angles, rows 7 to 10 with the second.
+    let (s, c) = (|deg: f64| deg.to_radians().sin(), |deg: f64| deg.to_radians().cos());
+    let angles = [[15.0, 30.0, 45.0, 60.0], [30.0, 45.0, 60.0, 75.0]];
+    let published = [
+        vec![[-1.0, 0.0, 0.0]],
+        angles[0].map(|a| [-c(a), 0.0, -s(a)]).into(),
+        vec![[0.0, 0.0, -1.0]],
+        angles[1].map(|a| [s(a), 0.0, -c(a)]).into(),
+        vec![[1.0, 0.0, 0.0], [0.0, -1.0, 0.0]],
+        angles[0].map(|a| [-s(a), -c(a), 0.0]).into(),
+        vec![[-1.0, 0.0, 0.0]],
+        angles[1].map(|a| [-c(a), s(a), 0.0]).into(),
+        vec![[0.0, 1.0, 0.0], [0.0, 0.0, -1.0]],
+        angles[0].map(|a| [0.0, -s(a), -c(a)]).into(),
+        vec![[0.0, -1.0, 0.0]],
+        angles[1].map(|a| [0.0, -c(a), s(a)]).into(),
+        vec![[0.0, 0.0, 1.0]],
+    ]
+    .concat();
+    assert_eq!((xu.len(), published.len()), (33, 33));
+    for (k, (ours, theirs)) in xu.iter().zip(published).enumerate() {
+        let off = (ours.up - Vector3::from(theirs)).norm();
+        assert!(off < 1e-12, "position {k}: {} is {off} off", ours.up);
+    }
     // Successive dwells of niu differ by a quarter turn, or by a turn about the vertical.
     let niu = Scheme::Niu8.settings(Sensor::Accel).unwrap();
     for k in 0..8 {
