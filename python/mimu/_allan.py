@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from mimu import _frame, _mimu, _plot
-from mimu._mimu import Calibration, Noise, Recording
+from mimu._arguments import arguments, calibration_of, several
+from mimu._mimu import Noise, Recording
 from mimu._result import Array, Judgement, Message, Result, judged, messages, typed
+
+if TYPE_CHECKING:
+    from mimu._arguments import CalibrationLike
 
 
 @dataclass(frozen=True)
@@ -120,16 +124,13 @@ def allan(
     kind: Literal["allan", "modified", "hadamard"] = "allan",
     per_decade: int = 10,
     confidence: float = 0.95,
-    calibration: Calibration | None = None,
+    calibration: CalibrationLike | None = None,
 ) -> Allan:
     """Allan deviation and noise model of a unit at rest, as ``mimu allan`` computes them.
 
     Several recordings must belong to one unit, each at another temperature. ``from_s`` and ``to_s``, or a ``step``, choose a segment. With a
-    ``calibration``, readings in V or counts become SI.
+    ``calibration``, a result that gives one, or its file, readings in V or counts become SI.
     """
-    return Allan(
-        _mimu.allan(
-            list(recordings), from_s=from_s, to_s=to_s, step=step, kind=kind, per_decade=per_decade, confidence=confidence,
-            calibration=calibration,
-        )
-    )
+    options = {"from": from_s, "to": to_s, "step": step, "kind": kind, "per_decade": per_decade, "confidence": confidence}
+    by = None if calibration is None else calibration_of(calibration)
+    return Allan(_mimu.allan(several(recordings), arguments(options), calibration=by))

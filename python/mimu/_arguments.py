@@ -1,10 +1,56 @@
-"""Keywords as the arguments of the command."""
+"""Arguments: keywords as options of the command, and objects or the files of them."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+from mimu import _mimu
+from mimu._mimu import Calibration, Noise, Recording
+
+if TYPE_CHECKING:
+    from mimu._allan import Allan
+    from mimu._diagnosis import Diagnosis
+    from mimu._fit import Fit, SessionsFit
+    from mimu._noise_in_use import NoiseInUse
+    from mimu.thermal import ThermalFit
+
+    #: A calibration, a result that gives one, or a file.
+    CalibrationLike: TypeAlias = Calibration | Fit | SessionsFit | Diagnosis | ThermalFit | str | os.PathLike[str]
+    #: Noise, a result that gives it, or a file.
+    NoiseLike: TypeAlias = Noise | Allan | NoiseInUse | str | os.PathLike[str]
+
+Path: TypeAlias = str | os.PathLike[str]
+
+
+def calibration_of(given: CalibrationLike, name: str = "calibration") -> Calibration:
+    """The calibration that an argument gives."""
+    made = _mimu.load_calibration(given) if isinstance(given, (str, os.PathLike)) else getattr(given, "calibration", given)
+    if not isinstance(made, Calibration):
+        raise TypeError(f"{name}: {type(given).__name__} gives no calibration; give a mimu.Calibration, a mimu.Fit or the path of a file")
+    return made
+
+
+def noise_of(given: NoiseLike | None) -> Noise | None:
+    """The noise that the argument ``noise`` gives."""
+    made = _mimu.load_noise(given) if isinstance(given, (str, os.PathLike)) else getattr(given, "noise", given)
+    if made is not None and not isinstance(made, Noise):
+        raise TypeError(f"noise: {type(given).__name__} gives no noise; give a mimu.Noise, a mimu.Allan or the path of a file")
+    return made
+
+
+def several(recordings: Recording | Sequence[Recording], name: str = "recordings") -> list[Recording]:
+    """One recording, or more, as a list."""
+    every = [recordings] if isinstance(recordings, Recording) else recordings
+    if not (_is_list(every) and all(isinstance(each, Recording) for each in every)):
+        raise TypeError(f"{name}: {type(recordings).__name__} is not a recording; give a mimu.Recording or a list of them")
+    return list(every)
+
+
+def kept(keep: Any) -> str | None:
+    """The dwells that are kept, as the command takes them."""
+    return keep if keep is None or isinstance(keep, str) else ",".join(map(str, keep))
 
 
 def arguments(options: Mapping[str, Any]) -> list[str]:
@@ -27,7 +73,7 @@ def arguments(options: Mapping[str, Any]) -> list[str]:
 
 
 def _is_list(value: Any) -> bool:
-    return isinstance(value, Sequence) and not isinstance(value, str)
+    return isinstance(value, Sequence) and not isinstance(value, str | bytes)
 
 
 def _text(value: Any) -> str:

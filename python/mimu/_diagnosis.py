@@ -5,13 +5,17 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from mimu import _frame, _mimu
-from mimu._fit import Keep, Steps, _keep
-from mimu._mimu import Calibration, Noise, Recording
-from mimu._recording import several
+from mimu._arguments import arguments, calibration_of, kept, noise_of, several
+from mimu._error import Error
+from mimu._fit import Keep, Steps
+from mimu._mimu import Calibration, Recording
 from mimu._result import Judgement, Message, Result, judged, messages, typed
+
+if TYPE_CHECKING:
+    from mimu._arguments import CalibrationLike, NoiseLike
 
 
 @dataclass(frozen=True)
@@ -141,12 +145,14 @@ def diagnose(
     recordings: Recording | Sequence[Recording],
     *,
     verify: Recording | Sequence[Recording] | None = None,
-    calibration: Calibration | None = None,
+    calibration: CalibrationLike | None = None,
     accept: Sequence[str] = (),
     still: float | None = None,
     steps: Steps | None = None,
     keep: Keep | None = None,
-    noise: Noise | None = None,
+    noise: NoiseLike | None = None,
+    whole_turns: int | bool = False,
+    placement: float | None = None,
 ) -> Diagnosis:
     """Finds the effect behind the residual of a unit, as ``mimu diagnose`` does.
 
@@ -155,12 +161,13 @@ def diagnose(
     of ``calibration`` are kept, for a unit that is never turned. ``accept`` names terms to accept on the evidence of these recordings alone. The
     other arguments are those of :func:`mimu.fit`.
     """
-    others = [] if verify is None else several(verify)
+    others = [] if verify is None else several(verify, "verify")
     if len(others) > 1:
-        raise ValueError("verify: a diagnosis is judged by one other recording; judge its calibration by more with mimu.verify")
+        raise Error.of("verify", "a diagnosis is judged by one other recording", "judge its calibration by more with mimu.verify")
+    options = dict(accept=accept, still=still, steps=steps, keep=kept(keep), whole_turns=whole_turns, placement=placement)
     return Diagnosis(
         _mimu.diagnose(
-            several(recordings), verify=others[0] if others else None, calibration=calibration, accept=list(accept), still=still, steps=steps,
-            keep=_keep(keep), noise=noise,
+            several(recordings), arguments(options), verify=others[0] if others else None,
+            calibration=None if calibration is None else calibration_of(calibration), noise=noise_of(noise),
         )
     )

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
-from typing import Any, Literal, cast
+from typing import TYPE_CHECKING, Any, Literal, cast
 
 from mimu import _mimu
-from mimu._allan import Allan
-from mimu._arguments import arguments
-from mimu._diagnosis import Diagnosis
-from mimu._fit import Fit, Steps
+from mimu._arguments import Path, arguments, calibration_of, noise_of
+from mimu._fit import Steps
 from mimu._mimu import Calibration, Noise, Recording
-from mimu._recording import Path
 from mimu._result import Judgement, Message, Result, _Kept, judged, messages, typed
-from mimu.thermal import ThermalFit
+
+if TYPE_CHECKING:
+    from mimu._arguments import CalibrationLike, NoiseLike
 
 
 def load(path: Path) -> Calibration:
@@ -70,23 +69,16 @@ class Verification(Result):
         return "<mimu.Verification: " + ", ".join(f"{name} {s.rms:.4g} {s.unit}" for name, s in self.sensors.items()) + ">"
 
 
-def calibration_of(given: Calibration | Fit | Diagnosis | ThermalFit) -> Calibration:
-    """The calibration, or that of a result."""
-    return given if isinstance(given, Calibration) else given.calibration
-
-
-def noise_of(given: Noise | Allan | None) -> Noise | None:
-    """The noise, or that of a result."""
-    return given if given is None or isinstance(given, Noise) else given.noise
-
-
 def verify(
     recording: Recording,
-    calibration: Calibration | Fit | Diagnosis | ThermalFit,
+    calibration: CalibrationLike,
     *,
     still: float | None = None,
     steps: Steps | None = None,
-    noise: Noise | Allan | None = None,
+    noise: NoiseLike | None = None,
+    whole_turns: int | bool = False,
+    placement: float | None = None,
+    part: Path | None = None,
 ) -> Verification:
     """Judges a calibration by another recording, as ``mimu verify`` does.
 
@@ -94,9 +86,9 @@ def verify(
     ----------
     recording : Recording
         Another recording of the same unit.
-    calibration : Calibration, Fit, Diagnosis or thermal.ThermalFit
+    calibration : Calibration, Fit, SessionsFit, Diagnosis, thermal.ThermalFit or path
         What is judged.
-    still, steps, noise
+    still, steps, noise, whole_turns, placement, part
         As for :func:`mimu.fit`.
 
     Returns
@@ -104,7 +96,8 @@ def verify(
     Verification
         With a ``judgement``, and by sensor the errors before and after.
     """
-    return Verification(_mimu.verify(recording, calibration_of(calibration), still=still, steps=steps, noise=noise_of(noise)))
+    options = dict(still=still, steps=steps, whole_turns=whole_turns, placement=placement, part=part)
+    return Verification(_mimu.verify(recording, calibration_of(calibration), arguments(options), noise=noise_of(noise)))
 
 
 Format = Literal[
@@ -138,9 +131,8 @@ class Export:
         return _unpickled_export, (self.content, self._native.json())
 
     def save(self, path: Path) -> None:
-        """Writes the file."""
-        with open(path, "wb") as file:
-            file.write(self.content)
+        """Writes the file, whole or not at all."""
+        _mimu.write(path, self.content)
 
     def __str__(self) -> str:
         return self.content.decode(errors="replace")
@@ -156,8 +148,8 @@ def _unpickled_export(content: bytes, text: str) -> Export:
 def export(
     format: Format,
     *,
-    calibration: Calibration | Fit | Diagnosis | ThermalFit | None = None,
-    noise: Noise | Allan | None = None,
+    calibration: CalibrationLike | None = None,
+    noise: NoiseLike | None = None,
     **options: Any,
 ) -> Export:
     """A calibration, or noise, in the format of another program: every one of ``mimu export``, with its options as keywords.

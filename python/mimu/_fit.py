@@ -5,14 +5,18 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, overload
+from typing import TYPE_CHECKING, Any, Literal, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from mimu import _frame, _mimu, _plot
-from mimu._mimu import Calibration, Noise, Recording
+from mimu._arguments import Path, arguments, kept, noise_of, several
+from mimu._mimu import Calibration, Recording
 from mimu._result import Array, Judgement, Message, Result, judged, messages, typed
+
+if TYPE_CHECKING:
+    from mimu._arguments import NoiseLike
 
 Steps = Literal["given", "found"]
 Sensor = Literal["gyro", "accel"]
@@ -243,8 +247,12 @@ def fit(
     still: float | None = None,
     steps: Steps | None = None,
     keep: Keep | None = None,
-    noise: Noise | None = None,
-    prior: str | os.PathLike[str] | None = None,
+    noise: NoiseLike | None = None,
+    prior: Path | None = None,
+    whole_turns: int | bool = False,
+    placement: float | None = None,
+    reference_error: Path | None = None,
+    part: Path | None = None,
 ) -> Fit:
     """Calibrates the gyro and the accelerometer of a recording, as ``mimu fit`` does.
 
@@ -264,10 +272,18 @@ def fit(
         Takes the dwells of the step column as they are, or searches for them.
     keep : "all" or list of int, optional
         Dwells to use although the others contradict them.
-    noise : Noise, optional
-        Noise of the unit at rest: ``mimu.allan(...).noise``, or from :func:`mimu.load_noise`.
+    noise : Noise, Allan or path, optional
+        Noise of the unit at rest: of :func:`mimu.allan`, or a file.
     prior : path, optional
         Population of the unit's kind, as ``mimu fleet --prior`` writes it: it determines what few poses leave open.
+    whole_turns : bool or int, optional
+        Turns by hand that end where they began; their number, if each has the same.
+    placement : float, optional
+        How well the unit is put back after whole turns, degrees.
+    reference_error : path, optional
+        How well the true inputs are known: tilt of a table, right angles, rate, gravity.
+    part : str or path, optional
+        Part whose data sheet the unit is compared with: a name as ``"icm42688p"``, or a file. ``to_dict()["data_sheet"]`` has the comparison.
 
     Returns
     -------
@@ -284,9 +300,11 @@ def fit(
     >>> fit = mimu.fit(mimu.Recording(t, gyro, accel, units="deg/s,g"))
     >>> fit.judgement.kind, fit.gyro.parameters["scale_x"].value
     """
-    return Fit(
-        _mimu.fit(recording, holdout=holdout, method=method, only=only, still=still, steps=steps, keep=_keep(keep), noise=noise, prior=prior)
+    options = dict(
+        holdout=holdout, method=method, only=only, still=still, steps=steps, keep=kept(keep), prior=prior, whole_turns=whole_turns,
+        placement=placement, reference_error=reference_error, part=part,
     )
+    return Fit(_mimu.fit(recording, arguments(options), noise=noise_of(noise)))
 
 
 class SessionsFit(Result):
@@ -335,7 +353,7 @@ def fit_sessions(
     holdout: int = 4,
     still: float | None = None,
     steps: Steps | None = None,
-    noise: Noise | None = None,
+    noise: NoiseLike | None = None,
 ) -> SessionsFit:
     """Makes one calibration of several sessions of a unit, as ``mimu fit S1 S2 ...`` does.
 
@@ -353,10 +371,5 @@ def fit_sessions(
     SessionsFit
         Look at ``judgement`` and ``findings`` first; ``parameters["gyro"]["bias_x"]["next_power_on"]`` is the interval of tomorrow.
     """
-    return SessionsFit(
-        _mimu.fit_sessions(list(recordings), part_class=part_class, holdout=holdout, still=still, steps=steps, noise=noise)
-    )
-
-
-def _keep(keep: Keep | None) -> str | list[int] | None:
-    return keep if keep is None or isinstance(keep, str) else list(keep)
+    options = {"class": part_class, "holdout": holdout, "still": still, "steps": steps}
+    return SessionsFit(_mimu.fit_sessions(several(recordings), arguments(options), noise=noise_of(noise)))

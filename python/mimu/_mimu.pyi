@@ -2,7 +2,6 @@
 
 import os
 import pathlib
-from collections.abc import Sequence
 from typing import Any, Literal, final, overload
 
 import numpy as np
@@ -20,7 +19,7 @@ class Recording:
 
     def __new__(
         cls,
-        t: Any,
+        t: Any = None,
         gyro: Any = None,
         accel: Any = None,
         temp: Any = None,
@@ -192,69 +191,15 @@ def run(arguments: list[str]) -> int: ...
 def options(subcommand: str) -> list[str]: ...
 def design(arguments: list[str]) -> Design: ...
 def export(arguments: list[str], *, calibration: Calibration | None, noise: Noise | None) -> Export: ...
-def verify(recording: Recording, calibration: Calibration, *, still: float | None, steps: str | None, noise: Noise | None) -> Verification: ...
-def fit(
-    recording: Recording,
-    *,
-    holdout: int,
-    method: str | None,
-    only: str | None,
-    still: float | None,
-    steps: str | None,
-    keep: str | Sequence[int] | None,
-    noise: Noise | None,
-    prior: str | os.PathLike[str] | None,
-) -> Fit: ...
-def fit_sessions(
-    recordings: list[Recording],
-    *,
-    part_class: str,
-    holdout: int,
-    still: float | None,
-    steps: str | None,
-    noise: Noise | None,
-) -> SessionsFit: ...
+def verify(recording: Recording, calibration: Calibration, arguments: list[str], *, noise: Noise | None) -> Verification: ...
+def fit(recording: Recording, arguments: list[str], *, noise: Noise | None) -> Fit: ...
+def fit_sessions(recordings: list[Recording], arguments: list[str], *, noise: Noise | None) -> SessionsFit: ...
 def diagnose(
-    recordings: list[Recording],
-    *,
-    verify: Recording | None,
-    calibration: Calibration | None,
-    accept: list[str],
-    still: float | None,
-    steps: str | None,
-    keep: str | Sequence[int] | None,
-    noise: Noise | None,
+    recordings: list[Recording], arguments: list[str], *, verify: Recording | None, calibration: Calibration | None, noise: Noise | None
 ) -> Diagnosis: ...
-def allan(
-    recordings: list[Recording],
-    *,
-    from_s: float | None,
-    to_s: float | None,
-    step: int | None,
-    kind: str,
-    per_decade: int,
-    confidence: float,
-    calibration: Calibration | None,
-) -> Allan: ...
-def noise_in_use(
-    recording: Recording,
-    calibration: Calibration | None,
-    noise: Noise,
-    *,
-    trajectory: _Path | None,
-    trajectory_zero: float,
-    still: float | None,
-    steps: str | None,
-) -> NoiseInUse: ...
+def allan(recordings: list[Recording], arguments: list[str], *, calibration: Calibration | None) -> Allan: ...
+def noise_in_use(recording: Recording, calibration: Calibration | None, noise: Noise, arguments: list[str]) -> NoiseInUse: ...
 def thermal_fit(
-    recordings: list[Recording],
-    *,
-    verify: list[Recording],
-    estimator: str,
-    lag_s: float | None,
-    range_c: tuple[float, float] | None,
-    base: Calibration | None,
-    noise: Noise | None,
-    still: float | None,
-    steps: str | None,
+    recordings: list[Recording], arguments: list[str], *, verify: list[Recording], base: Calibration | None, noise: Noise | None
 ) -> ThermalFit: ...
+def write(path: _Path, content: bytes) -> None: ...

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from mimu import _mimu
-from mimu._allan import Allan
-from mimu._diagnosis import Diagnosis
-from mimu._files import calibration_of, noise_of
-from mimu._fit import Fit, Steps
-from mimu._mimu import Calibration, Noise, Recording
+from mimu._arguments import arguments, calibration_of, noise_of
+from mimu._fit import Steps
+from mimu._mimu import Noise, Recording
 from mimu._result import Judgement, Message, Result, judged, messages, typed
-from mimu.thermal import ThermalFit
+
+if TYPE_CHECKING:
+    from mimu._arguments import CalibrationLike, NoiseLike
 
 
 @dataclass(frozen=True)
@@ -141,8 +142,8 @@ class NoiseInUse(Result):
 
 def noise_in_use(
     recording: Recording,
-    calibration: Calibration | Fit | Diagnosis | ThermalFit | None,
-    noise: Noise | Allan,
+    calibration: CalibrationLike | None,
+    noise: NoiseLike,
     *,
     trajectory: str | os.PathLike[str] | None = None,
     trajectory_zero: float = 0.0,
@@ -155,9 +156,9 @@ def noise_in_use(
     ----------
     recording : Recording
         In motion, with rests before and after each motion, or with a ``trajectory``. It must not be the one that the calibration was made from.
-    calibration : Calibration, Fit, Diagnosis or thermal.ThermalFit, or None
+    calibration : Calibration, Fit, SessionsFit, Diagnosis, thermal.ThermalFit or path, or None
         Of the unit; None for readings in rad/s and m/s² as they are.
-    noise : Noise or Allan
+    noise : Noise, Allan or path
         Of the unit at rest.
     trajectory, trajectory_zero
         A file with poses of the unit by another instrument: ground truth of EuRoC, or of TUM's benchmarks; and its time at which ``t`` is 0, s.
@@ -170,9 +171,8 @@ def noise_in_use(
         With a ``judgement``, the ``densities``, and the ``causes``.
     """
     given = noise_of(noise)
-    assert given is not None
+    if given is None:
+        raise TypeError("noise: None gives no noise; give a mimu.Noise, a mimu.Allan or the path of a file")
     by = None if calibration is None else calibration_of(calibration)
-    found = _mimu.noise_in_use(
-        recording, by, given, trajectory=trajectory, trajectory_zero=trajectory_zero, still=still, steps=steps
-    )
-    return NoiseInUse(found)
+    options = dict(trajectory=trajectory, trajectory_zero=trajectory_zero if trajectory else None, still=still, steps=steps)
+    return NoiseInUse(_mimu.noise_in_use(recording, by, given, arguments(options)))

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mimu._error import Error
+
 if TYPE_CHECKING:
     from mimu._allan import Allan
     from mimu._fit import Fit
@@ -24,7 +26,7 @@ def residuals(fit: Fit, sensor: str, ax: Any) -> Any:
     """The size of each residual, held out where it was, and the noise that is due."""
     of = getattr(fit, sensor)
     if of is None:
-        raise ValueError(f"sensor={sensor!r}: the fit has no {sensor}")
+        raise Error.of("sensor", f"the fit has no {sensor}", "give one that was fitted")
     ax = _axes(ax)
     at = np.arange(len(of.residuals))
     held = [r.held_out is not None for r in of.residuals]
@@ -43,7 +45,7 @@ def deviations(allan: Allan, sensor: str, ax: Any) -> Any:
     """Deviations with their intervals, double logarithmic."""
     channels = [channel for channel in allan.channels if channel.name.startswith(sensor)]
     if not channels:
-        raise ValueError(f"sensor={sensor!r}: there is no channel of it")
+        raise Error.of("sensor", f"there is no channel of {sensor}", "give gyro or accel")
     ax = _axes(ax)
     for channel in channels:
         (line,) = ax.loglog(channel.tau_s, channel.adev, label=channel.name)

@@ -7,16 +7,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from mimu import _mimu
-from mimu._arguments import arguments
+from mimu._arguments import Path, arguments
 from mimu._mimu import Recording
-
-Path = str | os.PathLike[str]
-
-
-def several(recordings: Recording | Sequence[Recording]) -> list[Recording]:
-    """One recording, or more, as a list."""
-    return [recordings] if isinstance(recordings, Recording) else list(recordings)
-
 
 def read(
     *files: Path,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import types
 import warnings
@@ -137,6 +138,12 @@ def _value(hint: Any, data: Any) -> Any:
     if hint is float:
         return float("nan") if data is None else float(data)
     if isinstance(hint, type) and is_dataclass(hint):
-        hints = get_type_hints(hint)
-        return hint(**{f.name: _value(hints[f.name], data.get(f.name)) for f in fields(hint) if f.init})
+        return hint(**{name: _value(of, data.get(name)) for name, of in _hints(hint)})
     return data
+
+
+@functools.cache
+def _hints(cls: type) -> list[tuple[str, Any]]:
+    """Fields of a dataclass with their types; Python evaluates their text at each call."""
+    hints = get_type_hints(cls)
+    return [(f.name, hints[f.name]) for f in fields(cls) if f.init]

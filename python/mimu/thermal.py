@@ -5,13 +5,16 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from mimu import _frame, _mimu, _plot
+from mimu._arguments import arguments, calibration_of, noise_of, several
 from mimu._fit import Steps
-from mimu._mimu import Calibration, Noise, Recording
-from mimu._recording import several
+from mimu._mimu import Calibration, Recording
 from mimu._result import Array, Judgement, Message, Result, judged, messages, typed
+
+if TYPE_CHECKING:
+    from mimu._arguments import CalibrationLike, NoiseLike
 
 
 @dataclass(frozen=True)
@@ -119,8 +122,8 @@ def fit(
     estimator: Literal["joint", "cubic", "nodes", "ramp-niu", "soak", "soak-fang", "soak-constant-m"] = "joint",
     lag_s: float | None = None,
     range_c: tuple[float, float] | None = None,
-    base: Calibration | None = None,
-    noise: Noise | None = None,
+    base: CalibrationLike | None = None,
+    noise: NoiseLike | None = None,
     still: float | None = None,
     steps: Steps | None = None,
     at_rest: bool = False,
@@ -131,9 +134,11 @@ def fit(
     if it is known. ``range_c`` are the temperatures that the curves must cover. ``base`` is the calibration at one temperature, to which
     recordings at rest add the change of the biases; ``at_rest``: the unit lay still throughout.
     """
+    covered = None if range_c is None else "..".join(map(str, range_c))
+    options = dict(estimator=estimator, lag=lag_s, range=covered, still=still, steps=steps, at_rest=at_rest)
     return ThermalFit(
         _mimu.thermal_fit(
-            several(recordings), verify=several(verify), estimator=estimator, lag_s=lag_s, range_c=range_c, base=base, noise=noise, still=still,
-            steps="at rest" if at_rest else steps,
+            several(recordings), arguments(options), verify=several(verify, "verify"), base=None if base is None else calibration_of(base, "base"),
+            noise=noise_of(noise),
         )
     )

@@ -1,19 +1,21 @@
 //! Noise of a unit at rest.
 
+use std::ffi::OsString;
 use std::sync::Arc;
 
+use mimu::noise::noise_file::NoiseFile;
 use mimu::result::allan::AllanResult;
-use mimu::survey::{Options, Part, survey_all};
-use mimu_allan::Deviation;
+use mimu::survey::survey_all;
+use mimu_cli::called;
 use mimu_cli::report::{self, allan_plot, fragment};
-use mimu_recording::error::Result;
-use pyo3::exceptions::PyValueError;
+use mimu_recording::error::{Error, Result};
 use pyo3::prelude::*;
 
 use crate::calibration::Calibration;
+use crate::error::{raised, refused};
 use crate::noise::Noise;
 use crate::recording::{Recording, sources};
-use crate::work::{computed, json};
+use crate::work::{done, json};
 
 /// Noise from recordings of a unit at rest.
 #[pyclass(frozen, module = "mimu._mimu")]
@@ -45,68 +47,33 @@ impl Allan {
     }
 
     /// What the other functions take as noise.
-    fn noise(&self) -> PyResult<Noise> {
-        let file = self.result.noise_file(&self.created);
-        let file = file.ok_or_else(|| PyValueError::new_err("no recording is given"))?;
+    fn noise(&self, py: Python<'_>) -> PyResult<Noise> {
+        let file = self.result.noise_file(&self.created).ok_or_else(|| {
+            let remedy = "give one recording at least";
+            raised(py, &Error::new("noise", "no recording is given", remedy))
+        })?;
         Ok(Noise {
-            file: Arc::new(file),
+            file: Arc::new(NoiseFile {
+                place: format!("the noise of {}", file.device),
+                ..file
+            }),
         })
     }
 }
 
-/// Allan deviation and noise model of a unit at rest.
+/// Allan deviation and noise model of a unit at rest, by the arguments of `mimu allan`.
 #[pyfunction]
-#[pyo3(signature = (recordings, *, from_s, to_s, step, kind, per_decade, confidence, calibration))]
-#[expect(clippy::too_many_arguments)]
+#[pyo3(signature = (recordings, arguments, *, calibration))]
 pub(crate) fn allan(
     py: Python<'_>,
     recordings: Vec<PyRef<'_, Recording>>,
-    from_s: Option<f64>,
-    to_s: Option<f64>,
-    step: Option<i32>,
-    kind: &str,
-    per_decade: usize,
-    confidence: f64,
+    arguments: Vec<OsString>,
     calibration: Option<&Calibration>,
 ) -> PyResult<Allan> {
-    let refuse = |problem: String| Err(PyValueError::new_err(problem));
-    if !(1..=100).contains(&per_decade) {
-        return refuse(format!(
-            "per_decade={per_decade}: write a number from 1 to 100"
-        ));
-    }
-    if !(0.5..=0.999).contains(&confidence) {
-        return refuse(format!(
-            "confidence={confidence}: write a probability from 0.5 to 0.999"
-        ));
-    }
-    let part = match (step, from_s, to_s) {
-        (None, None, None) => Part::Whole,
-        (Some(step), None, None) => Part::Step(step),
-        (Some(_), ..) => {
-            return refuse("both step and times choose the segment: give only one".into());
-        }
-        (None, Some(from), Some(to)) if !(from < to) => {
-            return refuse(format!(
-                "from_s={from} is not before to_s={to}: exchange them"
-            ));
-        }
-        (None, from_s, to_s) => Part::Span { from_s, to_s },
-    };
-    let options = Options {
-        part,
-        kind: match kind {
-            "allan" => Deviation::Allan,
-            "modified" => Deviation::Modified,
-            "hadamard" => Deviation::Hadamard,
-            _ => return refuse(format!("kind={kind:?}: write allan, modified or hadamard")),
-        },
-        per_decade,
-        confidence,
-    };
-    let sources = sources(&recordings, "recordings")?;
+    let sources = sources(py, &recordings)?;
     let model = calibration.map(|calibration| calibration.model.clone());
-    computed(py, move || {
+    let work = move || {
+        let options = called::allan(arguments)?;
         let samples = sources
             .iter()
             .map(|s| s.samples().map(|s| s.as_ref().clone()));
@@ -116,5 +83,6 @@ pub(crate) fn allan(
             result: AllanResult::of(&surveys),
             created: mimu_cli::now(),
         })
-    })
+    };
+    done(py, work, refused)
 }

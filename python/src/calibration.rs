@@ -14,12 +14,12 @@ use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::stage;
 use numpy::ndarray::{Array2, ArrayView2, Zip};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+use crate::arrays::{Field, factor_of, ordered, triad, units_of};
 use crate::error::raised;
-use crate::recording::{Recording, ordered, triad, units_of};
+use crate::recording::Recording;
 use crate::work::{computed, loaded};
 
 /// Compensated readings of gyro and accelerometer.
@@ -91,13 +91,28 @@ impl Calibration {
         sensor: &str,
         die_temp_c: Option<f64>,
     ) -> PyResult<MatrixAndOffset<'py>> {
-        let sensor = named(sensor)?;
+        let refused =
+            |problem: String, remedy: &str| raised(py, &Error::new("sensor", problem, remedy));
+        let sensor = match sensor {
+            "gyro" => Sensor::Gyro,
+            "accel" => Sensor::Accel,
+            _ => {
+                return Err(refused(
+                    format!("{sensor:?} is not a sensor"),
+                    "write gyro or accel",
+                ));
+            }
+        };
         let model = match die_temp_c {
             Some(at) => self.model.inverse_at(sensor, at),
             None => self.model.inverse(sensor),
         };
-        let model = model
-            .ok_or_else(|| PyValueError::new_err(format!("the calibration has no {sensor}")))?;
+        let model = model.ok_or_else(|| {
+            refused(
+                format!("the calibration has no {sensor}"),
+                "ask for the other",
+            )
+        })?;
         let matrix = Array2::from_shape_fn((3, 3), |at| model.matrix[at]);
         let offset = PyArray1::from_slice(py, model.offset.as_slice());
         Ok((matrix.into_pyarray(py), offset))
@@ -154,9 +169,10 @@ impl Calibration {
                 let (rate, force) = self.apply_to_recording(py, recording.get())?;
                 Ok((rate.map(Bound::into_any), force.map(Bound::into_any)))
             }
-            Some(_) => Err(PyValueError::new_err(
-                "a recording contains both sensors: leave accel out",
-            )),
+            Some(_) => {
+                let problem = "a recording contains both sensors";
+                Err(raised(py, &Error::new("accel", problem, "leave accel out")))
+            }
             None if temp.is_some() || t.is_some() => {
                 let given = PyDict::new(py);
                 match units {
@@ -239,7 +255,7 @@ impl Calibration {
         if accel.cast::<Recording>().is_ok() {
             return Ok(());
         }
-        let readings = triad(accel, "accel", None)?.readonly();
+        let readings = triad(accel, Field::Accel)?.readonly();
         let rows = readings.as_array();
         let mut sizes: Vec<f64> = rows
             .rows()
@@ -304,15 +320,13 @@ impl Calibration {
                     &Error::new(&self.name, problem, "leave these readings out"),
                 )
             })?;
-            let readings = triad(readings, &sensor.to_string(), None)?.readonly();
+            let field = match sensor {
+                Sensor::Gyro => Field::Gyro,
+                Sensor::Accel => Field::Accel,
+            };
+            let readings = triad(readings, field)?.readonly();
             let view = readings.as_array();
-            let factor = factors[sensor as usize].ok_or_else(|| {
-                let problem = format!("the unit of the {sensor} is not given");
-                raised(
-                    py,
-                    &Error::new("units", problem, "give both units, as in units=\"deg/s,g\""),
-                )
-            })?;
+            let factor = factor_of(py, factors, field)?;
             let model = Affine {
                 matrix: model.matrix * factor,
                 ..model
@@ -368,17 +382,6 @@ fn like<'py>(
         kept.set_item(name, given.getattr(name)?)?;
     }
     given.get_type().call((values,), Some(&kept)).map(Some)
-}
-
-/// The sensor of a name.
-pub(crate) fn named(sensor: &str) -> PyResult<Sensor> {
-    match sensor {
-        "gyro" => Ok(Sensor::Gyro),
-        "accel" => Ok(Sensor::Accel),
-        _ => Err(PyValueError::new_err(format!(
-            "{sensor:?} is not a sensor: write gyro or accel"
-        ))),
-    }
 }
 
 fn compensated(model: &Affine<f64>, readings: &ArrayView2<f64>) -> Array2<f64> {

@@ -1,19 +1,18 @@
 //! The effect behind a residual.
 
+use std::ffi::OsString;
 use std::sync::Arc;
 
-use mimu::diagnose::Recordings;
-use mimu::diagnosed::{Diagnosed, diagnosed};
+use mimu::diagnosed::Diagnosed;
+use mimu_cli::called;
 use mimu_cli::report::{self, Detail, Made, fragment};
-use mimu_recording::error::Result;
 use pyo3::prelude::*;
 
 use crate::calibration::Calibration;
-use crate::error::raised;
+use crate::error::{raised, refused};
 use crate::noise::Noise;
-use crate::preparation::{KeptSteps, Preparation};
 use crate::recording::{Recording, Source, sources};
-use crate::work::{computed, json};
+use crate::work::{done, json};
 
 /// A diagnosis of recordings.
 #[pyclass(frozen, module = "mimu._mimu")]
@@ -61,48 +60,35 @@ impl Diagnosis {
     }
 }
 
-/// Finds the effect behind the residual of a unit.
+/// Finds the effect behind the residual of a unit, by the arguments of `mimu diagnose`.
 #[pyfunction]
-#[pyo3(signature = (recordings, *, verify, calibration, accept, still, steps, keep, noise))]
-#[expect(clippy::too_many_arguments)]
+#[pyo3(signature = (recordings, arguments, *, verify, calibration, noise))]
 pub(crate) fn diagnose(
     py: Python<'_>,
     recordings: Vec<PyRef<'_, Recording>>,
+    arguments: Vec<OsString>,
     verify: Option<&Recording>,
     calibration: Option<&Calibration>,
-    accept: Vec<String>,
-    still: Option<f64>,
-    steps: Option<&str>,
-    keep: Option<KeptSteps>,
     noise: Option<&Noise>,
 ) -> PyResult<Diagnosis> {
-    let by = Preparation::of(still, steps, keep, noise)?;
-    let sources = sources(&recordings, "recordings")?;
-    let second = verify.map(|recording| recording.source.clone());
+    let all = sources(py, &recordings)?;
+    let second = verify.map(|recording| &recording.source);
+    for source in all.iter().chain(second) {
+        source.samples().map_err(|error| raised(py, &error))?;
+    }
+    let open: Vec<_> = all.iter().map(Source::opener).collect();
+    let second = second.map(Source::opener);
     let given = calibration.map(|c| (c.model.clone(), c.name.clone()));
-    computed(py, move || {
-        let open = |source: &Source| {
-            source.samples()?;
-            source.prepared(&by)
-        };
-        let mut all: Vec<_> = sources.iter().map(open).collect::<Result<_>>()?;
-        let second = second.as_ref().map(open).transpose()?;
-        let name = second
+    let noise = noise.map(|noise| noise.file.clone());
+    let created = mimu_cli::now();
+    let now = created.clone();
+    let work = move || {
+        let given = given
             .as_ref()
-            .map(|prepared| prepared.manifest.device.clone());
-        let recordings = Recordings {
-            first: all.remove(0),
-            more: all,
-            second,
-            given: given.as_ref().map(|(model, _)| model.as_ref()),
-            accept,
-        };
-        let names = [
-            name.as_deref(),
-            given.as_ref().map(|(_, name)| name.as_str()),
-        ];
-        let created = mimu_cli::now();
-        let done = diagnosed(recordings, names, &created, &|_| ())?;
-        Ok(Diagnosis { done, created })
-    })
+            .map(|(model, name)| (model.as_ref(), name.as_str()));
+        let second = second.as_deref();
+        called::diagnose(arguments, &open, second, noise.as_deref(), given, &now)
+    };
+    let done = done(py, work, refused)?;
+    Ok(Diagnosis { done, created })
 }

@@ -1,16 +1,18 @@
 //! A calibration or noise in the format of another program.
 
 use std::ffi::OsString;
+use std::path::PathBuf;
 
 use mimu_cli::called;
 use mimu_export::Sources;
+use mimu_recording::result_file::stage;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
 use crate::calibration::Calibration;
 use crate::error::refused;
 use crate::noise::Noise;
-use crate::work::{done, json};
+use crate::work::{computed, done, json};
 
 /// A file for another program.
 #[pyclass(frozen, module = "mimu._mimu")]
@@ -29,6 +31,12 @@ impl Export {
     fn json(&self) -> PyResult<String> {
         json(&self.made)
     }
+}
+
+/// Writes a file, whole or not at all.
+#[pyfunction]
+pub(crate) fn write(py: Python<'_>, path: PathBuf, content: Vec<u8>) -> PyResult<()> {
+    computed(py, move || stage(&path, content)?.publish())
 }
 
 /// Exports by the arguments of `mimu export`, from the name of the format on.

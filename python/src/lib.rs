@@ -5,8 +5,8 @@
 //!
 //! | module | what |
 //! |---|---|
+//! | [`arrays`] | arrays that Python holds, and what is refused of them |
 //! | [`recording`] | a recording of arrays or on disk |
-//! | [`preparation`] | how its dwells are found, and its noise |
 //! | [`fit`], [`diagnosis`], [`allan`], [`thermal`], [`design`], [`verification`] | one result each |
 //! | [`calibration`], [`noise`], [`export`] | the files |
 //! | [`error`] | errors in Python |
@@ -14,6 +14,7 @@
 //! | [`command`] | the command itself |
 
 mod allan;
+mod arrays;
 mod calibration;
 mod command;
 mod design;
@@ -22,7 +23,6 @@ mod error;
 mod export;
 mod fit;
 mod noise;
-mod preparation;
 mod recording;
 mod thermal;
 mod verification;
@@ -44,7 +44,7 @@ mod _mimu {
     #[pymodule_export]
     use super::diagnosis::{Diagnosis, diagnose};
     #[pymodule_export]
-    use super::export::{Export, export};
+    use super::export::{Export, export, write};
     #[pymodule_export]
     use super::fit::{Fit, SessionsFit, fit, fit_sessions};
     #[pymodule_export]

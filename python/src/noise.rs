@@ -1,18 +1,20 @@
 //! Noise of a unit: at rest, as `mimu allan -o` writes it, and in use, as `mimu noise` finds it.
 
+use std::ffi::OsString;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use mimu::in_use::{self, Against, Trajectory};
+use mimu::in_use;
 use mimu::noise::noise_file::NoiseFile;
+use mimu_cli::called;
 use mimu_cli::report::{self, fragment};
 use mimu_recording::result_file::stage;
 use pyo3::prelude::*;
 
 use crate::calibration::Calibration;
-use crate::preparation::Preparation;
+use crate::error::refused;
 use crate::recording::Recording;
-use crate::work::{computed, json, loaded};
+use crate::work::{computed, done, json, loaded};
 
 /// Noise of a unit at rest.
 #[pyclass(frozen, module = "mimu")]
@@ -110,44 +112,26 @@ impl NoiseInUse {
     }
 }
 
-/// Finds the noise of a unit in use.
+/// Finds the noise of a unit in use, by the arguments of `mimu noise`.
 #[pyfunction]
-#[expect(clippy::too_many_arguments)]
-#[pyo3(signature = (recording, calibration, noise, *, trajectory, trajectory_zero, still, steps))]
+#[pyo3(signature = (recording, calibration, noise, arguments))]
 pub(crate) fn noise_in_use(
     py: Python<'_>,
     recording: &Recording,
     calibration: Option<&Calibration>,
     noise: &Noise,
-    trajectory: Option<PathBuf>,
-    trajectory_zero: f64,
-    still: Option<f64>,
-    steps: Option<&str>,
+    arguments: Vec<OsString>,
 ) -> PyResult<NoiseInUse> {
-    let by = Preparation::of(still, steps, None, None)?;
-    let (source, given) = (
-        recording.source.clone(),
-        calibration.map(|c| c.model.clone()),
-    );
-    let noise = noise.file.clone();
-    computed(py, move || {
+    let (source, noise) = (recording.source.clone(), noise.file.clone());
+    let given = calibration.map(|c| c.model.clone());
+    let work = move || {
         let samples = source.samples()?;
         let model = match given {
             Some(given) => given,
             None => Arc::new(mimu::Calibration::of_si(&samples.manifest)?),
         };
-        let found = match trajectory {
-            Some(path) => {
-                let poses = Trajectory::read(&path)?.counted_from(trajectory_zero);
-                let against = Against::Trajectory(&poses);
-                in_use::noise_in_use(samples, &model, &noise, against, |_| ())?
-            }
-            None => {
-                let prepared = source.prepared(&by)?;
-                let against = Against::Rests(&prepared);
-                in_use::noise_in_use(samples, &model, &noise, against, |_| ())?
-            }
-        };
+        let found = called::noise_in_use(arguments, samples, &model, &noise)?;
         Ok(NoiseInUse { found })
-    })
+    };
+    done(py, work, refused)
 }

@@ -2,36 +2,63 @@
 
 use std::collections::BTreeMap;
 use std::ffi::OsString;
-use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use mimu::prepared::Prepared;
 use mimu::quantity::normal_gravity;
+use mimu::readable::STANDARD_GRAVITY;
 use mimu::warning::Warning;
-use mimu_cli::called;
+use mimu_cli::called::{self, Open};
 use mimu_cli::report::fragment;
-use mimu_recording::error::{Argument, Error, Result};
-use mimu_recording::look::Given;
+use mimu_recording::error::{Error, Result};
 use mimu_recording::{
-    Column, Columns, InMemory, Manifest, PoseMeans, RawUnit, Reference, SampleFormat, Writer,
-    usual_rate_hz,
+    Column, InMemory as _, Manifest, PoseMeans, Reference, SampleFormat, Writer, usual_rate_hz,
 };
 use numpy::ndarray::{Array2, ArrayView1, s};
-use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
-use pyo3::exceptions::PyValueError;
+use numpy::{IntoPyArray, PyArray1, PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
-use pyo3::types::{IntoPyDict, PyBytes, PyDict, PySlice};
+use pyo3::types::{PyBytes, PyDict, PySlice};
 use tempfile::TempDir;
 
+use crate::arrays::{Arrays, Field, array, factor_of, is_of_dates, units_of, without_times};
 use crate::error::{keywords, raised, refused};
-use crate::preparation::Preparation;
 use crate::work::{computed, done, json, loaded};
 
-/// Gravity if it is not given, m/s².
-const STANDARD_GRAVITY: f64 = 9.80665;
-
-/// A recording of a unit.
+/// A recording of a unit, of arrays. Lists, slices of one table and columns of pandas are arrays too.
+///
+/// Parameters
+/// ----------
+/// t : array_like of shape (n,), optional
+///     Times of the samples, s, ascending; dates and durations of numpy or pandas count from the first. By default the index of a table, or `rate_hz`.
+/// gyro : array_like of shape (n, 3), optional
+///     Readings of the gyro in x, y, z, in `unit` or `units`.
+/// accel : array_like of shape (n, 3), optional
+///     Readings of the accelerometer, likewise.
+/// temp : array_like of shape (n,), optional
+///     Temperatures, degrees Celsius.
+/// unit : {"V", "count", "SI"}, optional
+///     Unit of the readings; SI is rad/s and m/s².
+/// units : str, optional
+///     Units of gyro and accelerometer that are converted to SI, such as "deg/s,g"; in place of `unit`.
+/// gravity : float, optional
+///     Local gravity, m/s². By default that of `latitude_deg`, or 9.80665 with a warning.
+/// reference : {"gravity", "table", "turntable-rate"}
+///     What is known of the true input: the magnitude of gravity at rest, `ref_rate_dps` and `ref_force_mps2`, or the magnitude of a turntable's rate.
+/// rate_hz : float, optional
+///     Samples a second, Hz. By default that of `t`.
+/// step : array_like of shape (n,), optional
+///     Number of the dwell of each sample, -1 in transit. By default the dwells are found by stillness.
+/// ref_rate_dps : array_like of shape (n, 3), optional
+///     Known rates, deg/s.
+/// ref_force_mps2 : array_like of shape (n, 3), optional
+///     Known specific forces, m/s².
+/// device : str
+///     Name of the unit.
+/// latitude_deg : float, optional
+///     Latitude, degrees.
+/// power_on_s : float, optional
+///     Time at which the unit was switched on, s, on the clock of `t`.
 #[pyclass(frozen, module = "mimu")]
 pub(crate) struct Recording {
     pub(crate) source: Source,
@@ -79,13 +106,13 @@ impl Source {
         })
     }
 
-    /// The recording, prepared for estimation.
-    pub(crate) fn prepared(&self, by: &Preparation) -> Result<Prepared> {
-        let prepared = match self {
-            Self::Samples(recording) => Prepared::read(recording, by.search(), |_| {})?,
-            Self::Means(means) => Prepared::of_means(means)?,
-        };
-        by.complete(prepared)
+    /// What reads it for estimation.
+    pub(crate) fn opener(&self) -> Box<Open> {
+        let source = self.clone();
+        Box::new(move |search| match &source {
+            Self::Samples(recording) => Prepared::read(recording, search, |_| {}),
+            Self::Means(means) => Prepared::of_means(means),
+        })
     }
 
     /// The samples.
@@ -103,7 +130,7 @@ impl Source {
         }
     }
 
-    fn manifest(&self) -> &Manifest {
+    pub(crate) fn manifest(&self) -> &Manifest {
         match self {
             Self::Samples(recording) => &recording.manifest,
             Self::Means(means) => &means.manifest,
@@ -111,229 +138,18 @@ impl Source {
     }
 }
 
-/// The Python arrays of a recording.
-#[derive(Debug)]
-struct Arrays {
-    t: Py<PyArray1<f64>>,
-    step: Option<Py<PyArray1<f64>>>,
-    temp: Option<Py<PyArray1<f64>>>,
-    gyro: Option<Py<PyArray2<f64>>>,
-    accel: Option<Py<PyArray2<f64>>>,
-    rate_dps: Option<Py<PyArray2<f64>>>,
-    force_mps2: Option<Py<PyArray2<f64>>>,
-    rows: usize,
-}
+/// An array of a recording, if it has one.
+type Values<'py> = Option<Bound<'py, PyArrayDyn<f64>>>;
 
-impl InMemory for Arrays {
-    fn rows(&self) -> usize {
-        self.rows
-    }
-
-    fn columns(&self) -> Columns {
-        let [rate, force] = [self.rate_dps.is_some(), self.force_mps2.is_some()];
-        Columns {
-            step: self.step.is_some(),
-            temp_c: self.temp.is_some(),
-            gyro: self.gyro.is_some(),
-            accel: self.accel.is_some(),
-            reference: [rate, rate, rate, force, force, force],
-        }
-    }
-
-    /// Holds the interpreter's lock, so that Python cannot write into an array meanwhile; for 65,536 rows at a time.
-    fn append(&self, column: Column, rows: Range<usize>, values: &mut Vec<f64>) -> Result<()> {
-        let changed = || {
-            let problem = "the array was resized, or is being written to";
-            Error::new(
-                column.name(),
-                problem,
-                "leave the array unchanged until the function returns",
-            )
-        };
-        Python::attach(|py| {
-            let mut extend = |view: ArrayView1<f64>| values.extend(view.iter());
-            let (array, axis) = match column {
-                Column::Time | Column::Step | Column::Temperature => {
-                    let array = match column {
-                        Column::Time => Some(&self.t),
-                        Column::Step => self.step.as_ref(),
-                        _ => self.temp.as_ref(),
-                    };
-                    let Some(array) = array else { return Ok(()) };
-                    let array = array.bind(py).try_readonly().map_err(|_| changed())?;
-                    let view = array.as_array();
-                    if view.len() < rows.end {
-                        return Err(changed());
-                    }
-                    extend(view.slice(s![rows]));
-                    return Ok(());
-                }
-                Column::Raw(i) => (if i < 3 { &self.gyro } else { &self.accel }, i % 3),
-                Column::Reference(i) => (
-                    if i < 3 {
-                        &self.rate_dps
-                    } else {
-                        &self.force_mps2
-                    },
-                    i % 3,
-                ),
-            };
-            let Some(array) = array else { return Ok(()) };
-            let array = array.bind(py).try_readonly().map_err(|_| changed())?;
-            let view = array.as_array();
-            if view.nrows() < rows.end || view.ncols() != 3 {
-                return Err(changed());
-            }
-            extend(view.slice(s![rows, axis]));
-            Ok(())
-        })
-    }
-}
-
-/// `value` as an array of doubles; the same array if it is one already.
-///
-/// # Errors
-/// Arrays whose meaning numpy would drop without a word: masked ones, and quantities with a unit of their own.
-fn doubles<'py>(value: &Bound<'py, PyAny>, name: &str) -> PyResult<Bound<'py, PyAny>> {
-    let py = value.py();
-    let numpy = py.import("numpy")?;
-    let refused = |problem: &str, remedy: &str| {
-        let error = Error::new(name, problem, remedy);
-        Err(raised(py, &error))
-    };
-    if value.is_instance(&numpy.getattr("ma")?.getattr("MaskedArray")?)? {
-        return refused(
-            "it is a masked array, and a sample without a value is NaN here",
-            "give array.filled(numpy.nan)",
-        );
-    }
-    // pint's quantities, and astropy's.
-    for (number, unit) in [("magnitude", "units"), ("value", "unit")] {
-        if value.hasattr(number)? && value.hasattr(unit)? {
-            let problem = format!("it carries the unit {}", value.getattr(unit)?.str()?);
-            let remedy = format!("give its numbers (.{number}), and their units as units=");
-            return refused(&problem, &remedy);
-        }
-    }
-    let kwargs = [("dtype", "float64")].into_py_dict(py)?;
-    numpy.call_method("asarray", (value,), Some(&kwargs))
-}
-
-fn shape(array: &Bound<'_, PyAny>) -> String {
-    array
-        .getattr("shape")
-        .map_or_else(|_| "?".into(), |s| s.to_string())
-}
-
-/// A number for each sample.
-fn column<'py>(
-    value: &Bound<'py, PyAny>,
-    name: &str,
-    rows: Option<usize>,
-) -> PyResult<Bound<'py, PyArray1<f64>>> {
-    let array = doubles(&ordered(value)?, name)?;
-    let fits = |a: &Bound<'py, PyArray1<f64>>| rows.is_none_or(|rows| a.len() == rows);
-    match array.cast::<PyArray1<f64>>() {
-        Ok(column) if fits(column) => Ok(column.clone()),
-        _ => {
-            let all = rows.map_or("n".into(), |rows| rows.to_string());
-            let problem = format!("its shape is {}, but ({all},) is needed", shape(&array));
-            let error = Error::new(name, problem, "give a number for each sample");
-            Err(raised(value.py(), &error))
-        }
-    }
-}
-
-/// A table whose three columns differ in x, y and z alone, in the order x, y, z; everything else unchanged.
-pub(crate) fn ordered<'py>(value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
-    let names = match value.getattr_opt("columns")? {
-        Some(columns) => columns.try_iter()?.collect::<PyResult<Vec<_>>>()?,
-        None => return Ok(value.clone()),
-    };
-    let text: Vec<Vec<char>> = names
-        .iter()
-        .map(|name| Ok(name.str()?.to_string().to_lowercase().chars().collect()))
-        .collect::<PyResult<_>>()?;
-    let [a, b, c] = &text[..] else {
-        return Ok(value.clone());
-    };
-    let differ = |k: &usize| a.get(*k) != b.get(*k) || a.get(*k) != c.get(*k);
-    let places: Vec<usize> = (0..a.len().max(b.len()).max(c.len()))
-        .filter(differ)
-        .collect();
-    let at = |axis: char| {
-        text.iter()
-            .position(|name| name.get(places[0]) == Some(&axis))
-    };
-    let order = match places[..] {
-        [_] => ['x', 'y', 'z'].map(at),
-        _ => return Ok(value.clone()),
-    };
-    match order {
-        [Some(x), Some(y), Some(z)] => value.get_item(vec![&names[x], &names[y], &names[z]]),
-        _ => Ok(value.clone()),
-    }
-}
-
-/// Three numbers for each sample.
-pub(crate) fn triad<'py>(
-    value: &Bound<'py, PyAny>,
-    name: &str,
-    rows: Option<usize>,
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let array = doubles(&ordered(value)?, name)?;
-    let fits = |a: &Bound<'py, PyArray2<f64>>| {
-        a.shape()[1] == 3 && rows.is_none_or(|rows| a.shape()[0] == rows)
-    };
-    match array.cast::<PyArray2<f64>>() {
-        Ok(triad) if fits(triad) => Ok(triad.clone()),
-        _ => {
-            let all = rows.map_or("n".into(), |rows| rows.to_string());
-            let problem = format!("its shape is {}, but ({all}, 3) is needed", shape(&array));
-            let error = Error::new(name, problem, "give x, y and z of each sample in a row");
-            Err(raised(value.py(), &error))
-        }
-    }
-}
-
-/// A unit of readings, or a reference, by its name.
+/// A word of a setting.
 fn parsed<T: std::str::FromStr<Err = Error>>(py: Python<'_>, name: &str) -> PyResult<T> {
     name.parse().map_err(|error| raised(py, &error))
-}
-
-/// Unit of the readings, and the factors of gyro and accelerometer to it.
-pub(crate) fn units_of(
-    py: Python<'_>,
-    unit: Option<&str>,
-    units: Option<&str>,
-) -> PyResult<(RawUnit, [Option<f64>; 2])> {
-    match (unit, units) {
-        (Some(unit), None) => Ok((parsed(py, unit)?, [Some(1.0); 2])),
-        (None, Some(units)) => {
-            let given = Given::default().with_units(units);
-            let conversion = given.and_then(|given| given.conversion());
-            conversion.map_err(|error| raised(py, &error))
-        }
-        (None, None) => {
-            let problem = "the unit of the readings is not given";
-            let remedy =
-                "give units=\"deg/s,g\" or what they are in, or unit=\"count\", \"V\" or \"SI\"";
-            Err(raised(py, &Error::new("units", problem, remedy)))
-        }
-        (Some(_), Some(_)) => {
-            let problem = "unit and units say the same";
-            Err(raised(
-                py,
-                &Error::new("units", problem, "give one of them"),
-            ))
-        }
-    }
 }
 
 #[pymethods]
 impl Recording {
     #[new]
-    #[pyo3(signature = (t, gyro=None, accel=None, temp=None, *, unit=None, units=None, gravity=None, reference="gravity", rate_hz=None,
+    #[pyo3(signature = (t=None, gyro=None, accel=None, temp=None, *, unit=None, units=None, gravity=None, reference="gravity", rate_hz=None,
         step=None, ref_rate_dps=None, ref_force_mps2=None, device="unit", latitude_deg=None, power_on_s=None))]
     #[expect(clippy::too_many_arguments)]
     fn new(
@@ -356,64 +172,52 @@ impl Recording {
     ) -> PyResult<Self> {
         let reference: Reference = parsed(py, reference)?;
         let (unit, factors) = units_of(py, unit, units)?;
-        let first = |value: Option<&Bound<'_, PyAny>>| value.and_then(|v| v.len().ok());
-        let t = match (t, rate_hz, first(gyro).or(first(accel))) {
-            (Some(t), ..) => column(t, "t", None)?,
-            (None, Some(rate), Some(rows)) => {
-                let times = (0..rows).map(|row| row as f64 / rate);
-                PyArray1::from_iter(py, times)
+        // A table of pandas may have its dates as the index.
+        let index = gyro.or(accel).and_then(|table| table.getattr("index").ok());
+        let t = match (
+            t.or(index.as_ref().filter(|index| is_of_dates(index))),
+            rate_hz,
+        ) {
+            (Some(t), _) => array(t, Field::Time, None)?,
+            (None, Some(rate)) => {
+                let rows = gyro.or(accel).map_or(Ok(0), |table| table.len())?;
+                let times = PyArray1::from_iter(py, (0..rows).map(|row| row as f64 / rate));
+                times.to_dyn().clone()
             }
-            _ => {
-                let problem = "neither times nor a sample rate are given";
-                let remedy = "give the times in seconds as t, or rate_hz";
-                let error = Error::new("t", problem, remedy).about(Argument::SampleRate);
-                return Err(raised(py, &error));
-            }
+            (None, None) => return Err(without_times(py)),
         };
         let rows = t.len();
-        let of_triad = |value: Option<&Bound<'_, PyAny>>, name: &str, factor: Option<f64>| {
-            let scaled = |v: &Bound<'_, PyAny>| {
-                let given = triad(v, name, Some(rows))?;
-                match factor {
-                    Some(1.0) => Ok(given.unbind()),
-                    Some(factor) => {
-                        let scaled = given.readonly().as_array().map(|x| x * factor);
-                        Ok(scaled.into_pyarray(py).unbind())
-                    }
-                    None => {
-                        let problem = format!("the unit of the {name} is not given");
-                        let remedy = "give both units, as in units=\"deg/s,g\"";
-                        Err(raised(py, &Error::new("units", problem, remedy)))
-                    }
-                }
-            };
-            value.map(scaled).transpose()
-        };
-        let of_column = |value: Option<&Bound<'_, PyAny>>, name| {
-            value
-                .map(|v| Ok::<_, PyErr>(column(v, name, Some(rows))?.unbind()))
-                .transpose()
-        };
         let rate_hz = match rate_hz {
             Some(rate) => rate,
-            None => usual_rate_hz(&t.readonly().as_array().to_vec())
-                .map_err(|error| raised(py, &error))?,
+            None => {
+                let times: Vec<f64> = t.readonly().as_array().iter().copied().collect();
+                usual_rate_hz(&times).map_err(|error| raised(py, &error))?
+            }
         };
         let (gravity_mps2, warning) = gravity_at(gravity, latitude_deg, reference);
         let of_rate = Warning::of_rate(rate_hz).map(|warning| warning.to_string());
         let mut manifest = Manifest::new(device, rate_hz, gravity_mps2, unit, reference);
         manifest.latitude_deg = latitude_deg;
         manifest.power_on_s = power_on_s;
-        let arrays = Arrays {
-            step: of_column(step, "step")?,
-            temp: of_column(temp, "temp")?,
-            gyro: of_triad(gyro, "gyro", factors[0])?,
-            accel: of_triad(accel, "accel", factors[1])?,
-            rate_dps: of_triad(ref_rate_dps, "ref_rate_dps", Some(1.0))?,
-            force_mps2: of_triad(ref_force_mps2, "ref_force_mps2", Some(1.0))?,
-            rows,
-            t: t.unbind(),
-        };
+        let arrays = Arrays::of(py, |field| {
+            let value = match field {
+                Field::Time => return Ok(Some(t.clone())),
+                Field::Step => step,
+                Field::Temperature => temp,
+                Field::Gyro => gyro,
+                Field::Accel => accel,
+                Field::Rate => ref_rate_dps,
+                Field::Force => ref_force_mps2,
+            };
+            let Some(value) = value else {
+                return Ok(None);
+            };
+            let given = array(value, field, Some(rows))?;
+            Ok(Some(match factor_of(py, factors, field)? {
+                1.0 => given,
+                factor => (given.readonly().as_array().map(|x| x * factor)).into_pyarray(py),
+            }))
+        })?;
         let warnings = warning.into_iter().chain(of_rate).collect();
         let made = Self::of_arrays(py, manifest, arrays, warnings)?;
         Ok(Self {
@@ -435,31 +239,12 @@ impl Recording {
             );
             return Err(raised(py, &error));
         }
-        let column = |array: Option<Bound<'_, PyArray1<f64>>>| -> PyResult<_> {
-            let part = array.map(|array| array.get_item(rows)).transpose()?;
-            let typed = |part: Bound<'_, PyAny>| {
-                Ok::<_, PyErr>(part.cast_into::<PyArray1<f64>>()?.unbind())
+        let arrays = Arrays::of(py, |field| {
+            let Some(array) = self.field(py, field)? else {
+                return Ok(None);
             };
-            part.map(typed).transpose()
-        };
-        let triad = |array: Option<Bound<'_, PyArray2<f64>>>| -> PyResult<_> {
-            let part = array.map(|array| array.get_item(rows)).transpose()?;
-            let typed = |part: Bound<'_, PyAny>| {
-                Ok::<_, PyErr>(part.cast_into::<PyArray2<f64>>()?.unbind())
-            };
-            part.map(typed).transpose()
-        };
-        let t = self.t(py)?.get_item(rows)?.cast_into::<PyArray1<f64>>()?;
-        let arrays = Arrays {
-            step: column(self.step(py)?)?,
-            temp: column(self.temp_c(py)?)?,
-            gyro: triad(self.gyro(py)?)?,
-            accel: triad(self.accel(py)?)?,
-            rate_dps: triad(self.ref_rate_dps(py)?)?,
-            force_mps2: triad(self.ref_force_mps2(py)?)?,
-            rows: t.len(),
-            t: t.unbind(),
-        };
+            Ok(Some(array.get_item(rows)?.cast_into()?))
+        })?;
         let made = Self::of_arrays(py, samples.manifest.clone(), arrays, self.warnings.clone())?;
         Ok(Self {
             units: self.units.clone(),
@@ -478,23 +263,8 @@ impl Recording {
             let samples = self.source.samples().map_err(|error| raised(py, &error))?;
             let manifest = samples.manifest.to_toml();
             said.set_item("manifest", manifest.map_err(|error| raised(py, &error))?)?;
-            let columns = [
-                ("t", self.t(py)?.into_any()),
-                ("step", self.step(py)?.into_pyobject(py)?.into_any()),
-                ("temp", self.temp_c(py)?.into_pyobject(py)?.into_any()),
-                ("gyro", self.gyro(py)?.into_pyobject(py)?.into_any()),
-                ("accel", self.accel(py)?.into_pyobject(py)?.into_any()),
-                (
-                    "rate_dps",
-                    self.ref_rate_dps(py)?.into_pyobject(py)?.into_any(),
-                ),
-                (
-                    "force_mps2",
-                    self.ref_force_mps2(py)?.into_pyobject(py)?.into_any(),
-                ),
-            ];
-            for (name, array) in columns {
-                said.set_item(name, array)?;
+            for field in Field::ALL {
+                said.set_item(field.name(), self.field(py, field)?)?;
             }
             return Ok((
                 module.getattr("unpickled_arrays")?,
@@ -534,47 +304,44 @@ impl Recording {
 
     /// Times of the samples, s.
     #[getter]
-    fn t<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        match &self.arrays {
-            Some(arrays) => Ok(arrays.t.bind(py).clone()),
-            None => Ok(self.read(py, &[Column::Time])?.remove(0).into_pyarray(py)),
-        }
+    fn t<'py>(&self, py: Python<'py>) -> PyResult<Values<'py>> {
+        self.field(py, Field::Time)
     }
 
     /// Readings of the gyro, a row for each sample, in `unit`; None without a gyro.
     #[getter]
-    fn gyro<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
-        self.triad(py, Column::Raw, 0, |arrays| &arrays.gyro)
+    fn gyro<'py>(&self, py: Python<'py>) -> PyResult<Values<'py>> {
+        self.field(py, Field::Gyro)
     }
 
     /// Readings of the accelerometer, a row for each sample, in `unit`; None without one.
     #[getter]
-    fn accel<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
-        self.triad(py, Column::Raw, 3, |arrays| &arrays.accel)
+    fn accel<'py>(&self, py: Python<'py>) -> PyResult<Values<'py>> {
+        self.field(py, Field::Accel)
     }
 
     /// Temperatures, degrees Celsius; None without a thermometer.
     #[getter]
-    fn temp_c<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray1<f64>>>> {
-        self.column(py, Column::Temperature, |arrays| &arrays.temp)
+    fn temp_c<'py>(&self, py: Python<'py>) -> PyResult<Values<'py>> {
+        self.field(py, Field::Temperature)
     }
 
     /// Number of the dwell of each sample, -1 in transit; None if the dwells are found by stillness.
     #[getter]
-    fn step<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray1<f64>>>> {
-        self.column(py, Column::Step, |arrays| &arrays.step)
+    fn step<'py>(&self, py: Python<'py>) -> PyResult<Values<'py>> {
+        self.field(py, Field::Step)
     }
 
     /// Known rates, deg/s; None without any.
     #[getter]
-    fn ref_rate_dps<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
-        self.triad(py, Column::Reference, 0, |arrays| &arrays.rate_dps)
+    fn ref_rate_dps<'py>(&self, py: Python<'py>) -> PyResult<Values<'py>> {
+        self.field(py, Field::Rate)
     }
 
     /// Known specific forces, m/s²; None without any.
     #[getter]
-    fn ref_force_mps2<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
-        self.triad(py, Column::Reference, 3, |arrays| &arrays.force_mps2)
+    fn ref_force_mps2<'py>(&self, py: Python<'py>) -> PyResult<Values<'py>> {
+        self.field(py, Field::Force)
     }
 
     /// Name of the unit.
@@ -653,7 +420,7 @@ impl Recording {
 
     fn __len__(&self, py: Python<'_>) -> PyResult<usize> {
         match (&self.source, &self.arrays) {
-            (_, Some(arrays)) => Ok(arrays.rows),
+            (_, Some(arrays)) => Ok(arrays.rows()),
             (Source::Means(_), _) => Ok(0),
             (Source::Samples(samples), _) => match samples.rows() {
                 Some(rows) => Ok(rows as usize),
@@ -731,44 +498,24 @@ impl Recording {
         computed(py, move || source.samples()?.read_columns(&columns, |_| {}))
     }
 
-    fn column<'py>(
-        &self,
-        py: Python<'py>,
-        column: Column,
-        of: impl Fn(&Arrays) -> &Option<Py<PyArray1<f64>>>,
-    ) -> PyResult<Option<Bound<'py, PyArray1<f64>>>> {
+    /// The array of `field`, if there is one.
+    fn field<'py>(&self, py: Python<'py>, field: Field) -> PyResult<Values<'py>> {
         if let Some(arrays) = &self.arrays {
-            return Ok(of(arrays).as_ref().map(|array| array.bind(py).clone()));
+            return Ok(arrays.get(py, field));
         }
         let samples = self.source.samples().map_err(|error| raised(py, &error))?;
-        match samples.columns.has(column) {
-            true => Ok(Some(self.read(py, &[column])?.remove(0).into_pyarray(py))),
-            false => Ok(None),
-        }
-    }
-
-    fn triad<'py>(
-        &self,
-        py: Python<'py>,
-        column: impl Fn(usize) -> Column,
-        first: usize,
-        of: impl Fn(&Arrays) -> &Option<Py<PyArray2<f64>>>,
-    ) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
-        if let Some(arrays) = &self.arrays {
-            return Ok(of(arrays).as_ref().map(|array| array.bind(py).clone()));
-        }
-        let samples = self.source.samples().map_err(|error| raised(py, &error))?;
-        let columns = [0, 1, 2].map(|axis| column(first + axis));
+        let columns = field.columns();
+        let has = |column: &Column| samples.columns.has(*column);
         // The input may be known for some axes only.
-        if !columns.iter().any(|column| samples.columns.has(*column)) {
+        let there: Vec<Column> = columns.iter().copied().filter(has).collect();
+        if there.is_empty() {
             return Ok(None);
         }
-        let there: Vec<Column> = columns
-            .iter()
-            .copied()
-            .filter(|c| samples.columns.has(*c))
-            .collect();
-        let values = self.read(py, &there)?;
+        let mut values = self.read(py, &there)?;
+        if columns.len() == 1 {
+            let values = PyArray1::from_vec(py, values.remove(0));
+            return Ok(Some(values.to_dyn().clone()));
+        }
         let mut triad = Array2::from_elem((values[0].len(), 3), f64::NAN);
         for (column, values) in there.iter().zip(&values) {
             let axis = columns.iter().position(|c| c == column).unwrap_or_default();
@@ -776,7 +523,7 @@ impl Recording {
                 .slice_mut(s![.., axis])
                 .assign(&ArrayView1::from(values));
         }
-        Ok(Some(triad.into_pyarray(py)))
+        Ok(Some(triad.into_dyn().into_pyarray(py)))
     }
 }
 
@@ -833,23 +580,7 @@ where
 pub(crate) fn unpickled_arrays(py: Python<'_>, said: &Bound<'_, PyDict>) -> PyResult<Recording> {
     let text: String = pickled(said, "manifest")?;
     let manifest = Manifest::parse(&text, "pickle").map_err(|error| raised(py, &error))?;
-    let column = |name| {
-        pickled::<Option<Bound<'_, PyArray1<f64>>>>(said, name).map(|a| a.map(Bound::unbind))
-    };
-    let triad = |name| {
-        pickled::<Option<Bound<'_, PyArray2<f64>>>>(said, name).map(|a| a.map(Bound::unbind))
-    };
-    let t: Bound<'_, PyArray1<f64>> = pickled(said, "t")?;
-    let arrays = Arrays {
-        step: column("step")?,
-        temp: column("temp")?,
-        gyro: triad("gyro")?,
-        accel: triad("accel")?,
-        rate_dps: triad("rate_dps")?,
-        force_mps2: triad("force_mps2")?,
-        rows: t.len(),
-        t: t.unbind(),
-    };
+    let arrays = Arrays::of(py, |field| pickled(said, field.name()))?;
     let made = Recording::of_arrays(py, manifest, arrays, pickled(said, "warnings")?)?;
     Ok(Recording {
         units: pickled(said, "units")?,
@@ -910,19 +641,25 @@ pub(crate) fn read(
         source,
         arrays: None,
         imported: Some(json(&summary)?),
-        warnings: summary.warnings.iter().map(|w| keywords(w)).collect(),
+        warnings: summary
+            .warnings
+            .iter()
+            .map(|w| keywords(py, w))
+            .collect::<PyResult<_>>()?,
         directory: Some(directory),
         folder,
         units: None,
     })
 }
 
-/// Sources of `recordings`. Refuses an empty list, by the name of the argument.
-pub(crate) fn sources(recordings: &[PyRef<'_, Recording>], name: &str) -> PyResult<Vec<Source>> {
+/// Sources of `recordings`. Refuses an empty list.
+pub(crate) fn sources(
+    py: Python<'_>,
+    recordings: &[PyRef<'_, Recording>],
+) -> PyResult<Vec<Source>> {
     if recordings.is_empty() {
-        return Err(PyValueError::new_err(format!(
-            "{name}: give one recording at least"
-        )));
+        let error = Error::new("recordings", "there is none", "give one recording at least");
+        return Err(raised(py, &error));
     }
     Ok(recordings.iter().map(|r| r.source.clone()).collect())
 }

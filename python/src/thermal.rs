@@ -1,23 +1,22 @@
 //! Curves over temperature.
 
+use std::ffi::OsString;
 use std::sync::Arc;
 
+use mimu_cli::called;
 use mimu_cli::report::{self, Made, fragment};
 use mimu_recording::error::Result;
 use mimu_thermal::base;
-use mimu_thermal::classic::Classic;
-use mimu_thermal::fit::{Estimator, Options, ThermalFit as Fitted, fit};
+use mimu_thermal::fit::{ThermalFit as Fitted, fit};
 use mimu_thermal::result::ThermalResult;
 use mimu_thermal::session::Session;
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::calibration::Calibration;
-use crate::error::raised;
+use crate::error::{raised, refused};
 use crate::noise::Noise;
-use crate::preparation::Preparation;
 use crate::recording::{Recording, Source, sources};
-use crate::work::{computed, json};
+use crate::work::{done, json};
 
 /// A fit over temperature.
 #[pyclass(frozen, module = "mimu._mimu")]
@@ -65,61 +64,30 @@ impl ThermalFit {
     }
 }
 
-fn estimator(name: &str) -> PyResult<Estimator> {
-    let all = [
-        Estimator::Joint,
-        Estimator::Cubic,
-        Estimator::Classic(Classic::Nodes),
-        Estimator::Classic(Classic::RampNiu),
-        Estimator::Classic(Classic::Soak),
-        Estimator::Classic(Classic::SoakAsPrinted),
-        Estimator::Classic(Classic::SoakConstantM),
-    ];
-    let found = all.into_iter().find(|estimator| estimator.name() == name);
-    found.ok_or_else(|| {
-        let known = all.map(Estimator::name).join(", ");
-        PyValueError::new_err(format!("estimator={name:?}: choose one of {known}"))
-    })
-}
-
-/// Estimates all parameters over temperature, and the lag of the dies behind the thermometer.
+/// Estimates all parameters over temperature, and the lag of the dies behind the thermometer, by the arguments of `mimu thermal fit`.
 #[pyfunction]
-#[pyo3(signature = (recordings, *, verify, estimator, lag_s, range_c, base, noise, still, steps))]
-#[expect(clippy::too_many_arguments)]
+#[pyo3(signature = (recordings, arguments, *, verify, base, noise))]
 pub(crate) fn thermal_fit(
     py: Python<'_>,
     recordings: Vec<PyRef<'_, Recording>>,
+    arguments: Vec<OsString>,
     verify: Vec<PyRef<'_, Recording>>,
-    estimator: &str,
-    lag_s: Option<f64>,
-    range_c: Option<[f64; 2]>,
     base: Option<&Calibration>,
     noise: Option<&Noise>,
-    still: Option<f64>,
-    steps: Option<&str>,
 ) -> PyResult<ThermalFit> {
-    let by = Preparation::of(still, steps, None, noise)?;
-    let refuse = |problem: String| Err(PyValueError::new_err(problem));
-    if lag_s.is_some_and(|lag| !(-120.0..=600.0).contains(&lag)) {
-        return refuse("lag_s: write seconds from -120 (the dies lead) to 600".into());
-    }
-    if range_c.is_some_and(|[from, to]| !(from < to)) {
-        return refuse("range_c: write (lowest, highest) in degrees Celsius".into());
-    }
-    let options = Options {
-        estimator: self::estimator(estimator)?,
-        lag_s,
-        range_c,
-    };
     let verify: Vec<Source> = verify.iter().map(|r| r.source.clone()).collect();
-    let (sources, base) = (
-        sources(&recordings, "recordings")?,
-        base.map(|b| b.model.clone()),
-    );
-    computed(py, move || {
+    let sources = sources(py, &recordings)?;
+    let base = base.map(|base| base.model.clone());
+    let noise = noise.map(|noise| noise.file.clone());
+    let work = move || {
+        let (search, options) = called::thermal_fit(arguments)?;
         let session = |source: &Source| {
             source.samples()?;
-            Session::of(&source.prepared(&by)?)
+            let prepared = source.opener()(search)?;
+            match &noise {
+                Some(noise) => Session::of(&prepared.with_noise(noise)?),
+                None => Session::of(&prepared),
+            }
         };
         let all = |list: &[Source]| list.iter().map(session).collect::<Result<Vec<_>>>();
         let fitted = fit(all(&sources)?, &all(&verify)?, options)?;
@@ -129,5 +97,6 @@ pub(crate) fn thermal_fit(
             base,
             created: mimu_cli::now(),
         })
-    })
+    };
+    done(py, work, refused)
 }

@@ -1,14 +1,16 @@
 //! A calibration judged by another recording.
 
-use mimu::calibration::verify::Verification as Verified;
-use mimu_cli::report::{self, fragment};
+use std::ffi::OsString;
+
+use mimu_cli::called::{self, Verified};
+use mimu_cli::report::fragment;
 use pyo3::prelude::*;
 
 use crate::calibration::Calibration;
+use crate::error::refused;
 use crate::noise::Noise;
-use crate::preparation::Preparation;
 use crate::recording::Recording;
-use crate::work::{computed, json};
+use crate::work::{done, json};
 
 /// Errors of a calibration on another recording.
 #[pyclass(frozen, module = "mimu._mimu")]
@@ -21,39 +23,35 @@ pub(crate) struct Verification {
 impl Verification {
     /// JSON of the result, as `mimu verify --json` writes it.
     fn json(&self) -> PyResult<String> {
-        json(&self.verified)
+        json(&self.verified.json())
     }
 
     /// The text that `mimu verify` prints.
     fn text(&self) -> String {
-        report::verify_text(&self.verified, false)
+        self.verified.text(false)
     }
 
     /// A table.
     fn html(&self) -> String {
-        fragment::of_verification(&self.recording, &self.verified)
+        fragment::of_verification(&self.recording, &self.verified.result)
     }
 }
 
-/// Judges a calibration by a recording.
+/// Judges a calibration by a recording, by the arguments of `mimu verify`.
 #[pyfunction]
-#[pyo3(signature = (recording, calibration, *, still, steps, noise))]
+#[pyo3(signature = (recording, calibration, arguments, *, noise))]
 pub(crate) fn verify(
     py: Python<'_>,
     recording: &Recording,
     calibration: &Calibration,
-    still: Option<f64>,
-    steps: Option<&str>,
+    arguments: Vec<OsString>,
     noise: Option<&Noise>,
 ) -> PyResult<Verification> {
-    let by = Preparation::of(still, steps, None, noise)?;
-    let (source, model) = (recording.source.clone(), calibration.model.clone());
-    computed(py, move || {
-        let prepared = source.prepared(&by)?;
-        let verified = mimu::calibration::verify::verify(&prepared, &model)?;
-        Ok(Verification {
-            verified,
-            recording: prepared.manifest.device,
-        })
+    let (open, model) = (recording.source.opener(), calibration.model.clone());
+    let noise = noise.map(|noise| noise.file.clone());
+    let work = move || called::verify(arguments, &*open, noise.as_deref(), &model);
+    Ok(Verification {
+        verified: done(py, work, refused)?,
+        recording: recording.source.manifest().device.clone(),
     })
 }

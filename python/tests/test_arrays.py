@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 import tracemalloc
+from pathlib import Path
 from types import ModuleType
 
 import mimu
@@ -27,6 +28,36 @@ def test_other_numbers_are_converted() -> None:
     assert rec.gyro is not None and rec.accel is not None
     assert rec.gyro.dtype == np.float64 and np.array_equal(rec.gyro, counts)
     assert np.array_equal(rec.accel, counts[::-1])
+
+
+def test_dates_and_durations_are_seconds(arrays: mimu.Recording) -> None:
+    pandas = pytest.importorskip("pandas")
+    given = {"unit": "count", "gravity": 9.81}
+    since = arrays.t - arrays.t[0]
+    dates = np.datetime64("2026-03-29T01:59:59", "ns") + (since * 1e9).round().astype("timedelta64[ns]")
+    abroad = pandas.DatetimeIndex(dates).tz_localize("UTC").tz_convert("Europe/Berlin")
+    for t in (dates, pandas.Series(dates), abroad, dates - dates[0], dates.astype("datetime64[us]")):
+        rec = mimu.Recording(t, arrays.gyro, arrays.accel, **given)
+        np.testing.assert_allclose(rec.t, since, atol=1e-6)
+    table = pandas.DataFrame(arrays.gyro, index=abroad, columns=["gx", "gy", "gz"])
+    assert np.array_equal(mimu.Recording(gyro=table, **given).t, mimu.Recording(abroad, table, **given).t)
+    by_rate = mimu.Recording(gyro=arrays.gyro, rate_hz=50.0, **given)
+    assert by_rate.t[1] == 0.02 and len(by_rate) == len(arrays)
+
+
+def test_a_result_or_its_file_is_taken_for_what_it_gives(arrays: mimu.Recording, tmp_path: Path) -> None:
+    rows = np.hstack([arrays.gyro[:1], arrays.accel[:1]]) + np.random.default_rng(3).normal(size=(6000, 6)) * 4
+    still = mimu.Recording(None, rows[:, :3], rows[:, 3:], unit="count", gravity=9.80665, rate_hz=50.0, device=arrays.device)
+    noise, fit = mimu.allan(still), mimu.fit(arrays)
+    noise.save(tmp_path / "noise.toml")
+    fit.save(tmp_path / "cal.toml")
+    expected = mimu.fit(arrays, noise=noise.noise).to_dict()["sensors"]
+    assert expected != fit.to_dict()["sensors"]
+    for given in (noise, tmp_path / "noise.toml", str(tmp_path / "noise.toml")):
+        assert mimu.fit(arrays, noise=given).to_dict()["sensors"] == expected
+    expected = mimu.allan(still, calibration=fit.calibration).to_dict()
+    for given in (fit, tmp_path / "cal.toml", str(tmp_path / "cal.toml")):
+        assert mimu.allan(still, calibration=given).to_dict()["channels"] == expected["channels"]
 
 
 def test_any_layout_is_read_as_the_same_numbers(arrays: mimu.Recording) -> None:

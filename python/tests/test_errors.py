@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+from collections.abc import Callable
 from pathlib import Path
 
 import mimu
@@ -57,6 +58,16 @@ def test_an_experiment_that_does_not_determine_the_unit_is_of_its_own_kind() -> 
         ({"gyro": np.zeros((10, 3)), "unit": "mV"}, "write V, count or SI"),
         ({"gyro": np.zeros((10, 3)), "t": np.zeros(10)}, "the times do not give the sample rate"),
         ({}, "readings of neither sensor"),
+        ({"t": None, "gyro": np.zeros((10, 3))}, r"neither times nor a sample rate.*\(rate_hz=\)"),
+        ({"gyro": np.zeros((10, 3)), "rate_hz": 0.0}, "rate"),
+        ({"gyro": np.zeros((0, 3)), "t": []}, "t"),
+        ({"gyro": 1.0}, "gyro: its shape"),
+        ({"gyro": [[1.0, 2.0, 3.0], [4.0]]}, "gyro: it is not an array of numbers"),
+        ({"gyro": np.full((10, 3), "x")}, "gyro: it is not an array of numbers"),
+        ({"gyro": np.zeros((10, 3)), "temp": np.arange(10).astype("datetime64[s]")}, "temp: it contains dates"),
+        ({"gyro": np.zeros((10, 3)), "t": np.full(10, np.nan)}, "times do not give the sample rate"),
+        ({"gyro": np.zeros((10, 3)), "reference": "moon"}, "moon"),
+        ({"gyro": np.zeros((10, 3)), "unit": None, "units": "deg/s,furlong"}, "furlong"),
     ],
 )
 def test_arrays_that_do_not_fit_are_named(keywords: dict[str, object], says: str) -> None:
@@ -71,12 +82,87 @@ def test_options_that_there_are_not_are_errors_of_type_or_value(arrays: mimu.Rec
         mimu.export("px4", calibration=calibration, qgroundcontrol=True)
     with pytest.raises(ValueError, match="cannot be used with"):
         mimu.design(n=3, scheme="six-face")
-    with pytest.raises(ValueError, match='method="best": write least-squares'):
+    with pytest.raises(mimu.Error, match="^method: invalid value 'best'.*least-squares"):
         mimu.fit(arrays, method="best")
     with pytest.raises(mimu.Error, match="reference is"):
         mimu.fit(arrays, method="kalman")
-    with pytest.raises(ValueError, match="one other recording"):
+    with pytest.raises(mimu.Error, match="one other recording"):
         mimu.diagnose(arrays, verify=[arrays, arrays])
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        lambda rec, here: mimu.fit(rec, holdout=-1),
+        lambda rec, here: mimu.fit(rec, holdout=1),
+        lambda rec, here: mimu.fit(rec, still=float("nan")),
+        lambda rec, here: mimu.fit(rec, keep="some"),
+        lambda rec, here: mimu.fit(rec, keep=["a"]),
+        lambda rec, here: mimu.fit(rec, only="magnetometer"),
+        lambda rec, here: mimu.fit(rec, prior=here / "none.toml"),
+        lambda rec, here: mimu.fit(rec, noise=here / "none.toml"),
+        lambda rec, here: mimu.fit_sessions([]),
+        lambda rec, here: mimu.fit_sessions([rec], part_class="best"),
+        lambda rec, here: mimu.allan(),
+        lambda rec, here: mimu.allan(rec, from_s=5, to_s=1),
+        lambda rec, here: mimu.allan(rec, step=1, from_s=1),
+        lambda rec, here: mimu.allan(rec, per_decade=0),
+        lambda rec, here: mimu.allan(rec, confidence=2.0),
+        lambda rec, here: mimu.verify(rec, here),
+        lambda rec, here: mimu.diagnose([]),
+        lambda rec, here: mimu.diagnose(rec, accept=["none"]),
+        lambda rec, here: mimu.thermal.fit(rec, estimator="best"),
+        lambda rec, here: mimu.thermal.fit(rec, range_c=(60, -20)),
+        lambda rec, here: mimu.thermal.fit(rec, lag_s=1e9),
+        lambda rec, here: mimu.load(here),
+        lambda rec, here: mimu.load_noise(here / "none.toml"),
+        lambda rec, here: mimu.read(here),
+        lambda rec, here: mimu.read(),
+        lambda rec, here: mimu.read(here / "none.csv"),
+        lambda rec, here: rec.save(here / "x", format="xlsx"),
+        lambda rec, here: rec[::2],
+        lambda rec, here: mimu.design(n=-1),
+        lambda rec, here: mimu.next_experiment("none"),
+        lambda rec, here: mimu.export("none"),
+        lambda rec, here: mimu.export("px4"),
+        lambda rec, here: mimu.fit(rec).save(here),
+        lambda rec, here: mimu.export("c", calibration=mimu.fit(rec)).save(here),
+        lambda rec, here: mimu.fit(rec).apply(np.zeros((3, 2))),
+        lambda rec, here: mimu.fit(rec).apply([["a", "b", "c"]]),
+        lambda rec, here: mimu.fit(rec).apply(rec, rec.accel),
+        lambda rec, here: mimu.fit(rec).calibration.inverse("magnetometer"),
+    ],
+)
+def test_whatever_is_refused_is_an_error_of_mimu(wrong: Callable[[mimu.Recording, Path], object], arrays: mimu.Recording, tmp_path: Path) -> None:
+    with pytest.raises(mimu.Error) as caught:
+        wrong(arrays, tmp_path)
+    assert caught.value.problem and caught.value.remedy and "--" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "name"),
+    [
+        (lambda rec: mimu.fit("log.csv"), "recording"),
+        (lambda rec: mimu.fit(rec, noise=3), "noise"),
+        (lambda rec: mimu.allan(3), "recordings"),
+        (lambda rec: mimu.allan(rec, calibration=rec), "calibration"),
+        (lambda rec: mimu.diagnose(rec, verify=3), "verify"),
+        (lambda rec: mimu.verify(rec, None), "calibration"),
+        (lambda rec: mimu.thermal.fit(None), "recordings"),
+        (lambda rec: mimu.noise_in_use(rec, None, None), "noise"),
+    ],
+)
+def test_a_wrong_type_names_its_argument(wrong: Callable[[mimu.Recording], object], name: str, arrays: mimu.Recording) -> None:
+    with pytest.raises(TypeError, match=name):
+        wrong(arrays)
+
+
+def test_what_a_log_does_not_say_is_asked_in_words_of_python(tmp_path: Path) -> None:
+    log = tmp_path / "log.csv"
+    log.write_text("ax,ay,az,gx,gy,gz\n" + "0.1,0.2,9.8,0.01,0.02,0.03\n" * 200)
+    with pytest.raises(mimu.Error) as caught:
+        mimu.read(log)
+    assert caught.value.remedy.startswith(f'say it: mimu.read("{log}", ') and 'rate_hz="RATE"' in caught.value.remedy
 
 
 def test_an_error_comes_through_a_pickle_whole(tmp_path: Path) -> None:

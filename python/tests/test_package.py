@@ -26,9 +26,21 @@ def test_the_command_is_there_with_its_help_and_status() -> None:
     assert module.stdout.split() == ["mimu", mimu.__version__]
 
 
+#: Options about files that are written, and about what is printed.
+OF_FILES = {"json", "strict", "verbose", "replace", "force"}
+
+
 @pytest.mark.parametrize(
     ("function", "subcommand", "elsewhere"),
     [
+        # The objects, and destinations of the result.
+        (mimu.fit, "fit", OF_FILES | {"class", "dwells", "o"}),
+        (mimu.fit_sessions, "fit", OF_FILES | {"class", "dwells", "o", "method", "only", "keep", "prior", "whole_turns", "placement", "reference_error", "part"}),
+        (mimu.verify, "verify", OF_FILES),
+        (mimu.diagnose, "diagnose", OF_FILES | {"o", "page", "plan", "next"}),
+        (mimu.allan, "allan", OF_FILES | {"from", "to", "plot", "o"}),
+        (mimu.noise_in_use, "noise", OF_FILES | {"o"}),
+        (mimu.thermal.fit, "thermal fit", OF_FILES | {"lag", "range", "plot", "page", "o"}),
         # Destinations of the result; the short options of the faces are in `faces`.
         (mimu.read, "import", {"json", "o", "x", "y", "z"}),
         # Results other than a design, and the options for these only.
@@ -47,7 +59,7 @@ def test_the_command_is_there_with_its_help_and_status() -> None:
     ],
 )
 def test_every_option_of_the_command_is_a_keyword(function: object, subcommand: str, elsewhere: set[str]) -> None:
-    keywords = set(inspect.signature(function).parameters) - {"files", "output"}
+    keywords = set(inspect.signature(function).parameters) - {"files", "output", "recording", "recordings", "part_class", "from_s", "to_s", "lag_s", "range_c"}
     options = {option.replace("-", "_") for option in _mimu.options(subcommand)} - elsewhere
     assert keywords == options
 

@@ -51,6 +51,15 @@ def test_a_fit_of_arrays_is_that_of_the_same_numbers_in_a_file(folder: Path, arr
     assert without(mimu.fit(arrays).to_dict(), "sha256") == without(json_of("fit", folder), "sha256")
 
 
+def test_whole_turns_reference_and_part_are_those_of_the_command(folder: Path, by_hand: mimu.Recording, tmp_path: Path) -> None:
+    part = mimu.fit(by_hand, part="icm42688p").to_dict()
+    assert part == json_of("fit", folder, "--part", "icm42688p") and part["data_sheet"]["rows"]
+    fit = mimu.fit(by_hand, whole_turns=True, placement=2.0).to_dict()
+    assert fit == json_of("fit", folder, "--whole-turns", "--placement=2") != json_of("fit", folder)
+    with pytest.raises(mimu.Error, match="reference.toml"):
+        mimu.fit(by_hand, reference_error=tmp_path / "reference.toml")
+
+
 def test_text_and_calibration_are_those_of_the_command(folder: Path, by_hand: mimu.Recording, tmp_path: Path) -> None:
     fit = mimu.fit(by_hand)
     printed = run("fit", folder, "-o", tmp_path / "cal.toml").stdout
@@ -125,7 +134,7 @@ def test_several_sessions_are_those_of_the_command(folder: Path, tmp_path: Path)
     assert "next_power_on" in found.calibration.to_toml()
     with pytest.raises(mimu.Error, match="samples of"):
         mimu.fit_sessions([recording, recording])
-    with pytest.raises(ValueError, match="consumer or tactical"):
+    with pytest.raises(mimu.Error, match="^part_class: invalid value 'medical'.*consumer, tactical"):
         mimu.fit_sessions([recording], part_class="medical")  # type: ignore[arg-type]
 
 

@@ -152,12 +152,17 @@ pub(crate) struct NoiseArgs {
 }
 
 impl NoiseArgs {
-    /// `prepared`, with the noise of the file if one is given.
-    pub(crate) fn apply(&self, prepared: Prepared) -> Result<Prepared> {
-        match &self.file {
-            Some(path) => prepared.with_noise(&NoiseFile::read(path)?),
-            None => Ok(prepared),
-        }
+    /// The noise of the file, if one is given.
+    pub(crate) fn read(&self) -> Result<Option<NoiseFile>> {
+        self.file.as_deref().map(NoiseFile::read).transpose()
+    }
+}
+
+/// `prepared`, with `noise` if there is any.
+pub(crate) fn with_noise(prepared: Prepared, noise: Option<&NoiseFile>) -> Result<Prepared> {
+    match noise {
+        Some(noise) => prepared.with_noise(noise),
+        None => Ok(prepared),
     }
 }
 

@@ -5,19 +5,38 @@ use std::pin::Pin;
 use std::sync::mpsc::Receiver;
 
 use clap::{Args, CommandFactory, Parser};
+use mimu::calibration::Calibration;
+use mimu::diagnose::Recordings;
+use mimu::diagnosed::{Diagnosed, diagnosed};
+use mimu::in_use::NoiseInUse;
+use mimu::noise::noise_file::NoiseFile;
+use mimu::prepared::Prepared;
+use mimu::result::sessions::SessionsResult;
+use mimu::signal::stillness::DwellSearch;
+use mimu::survey;
 use mimu_export::{Export, Format, Sources};
-use mimu_recording::ImportSummary;
 use mimu_recording::error::Error;
+use mimu_recording::{ImportSummary, Recording};
+use mimu_thermal::fit::Options as ThermalOptions;
 use mimu_wizard::event::View;
 use mimu_wizard::relay::Stamped;
 use mimu_wizard::session::Outcome;
 
 use crate::Cli;
+use crate::cmd::allan::AllanArgs;
 use crate::cmd::design::DesignArgs;
 pub use crate::cmd::design::Designed;
+use crate::cmd::diagnose::DiagnoseArgs;
+use crate::cmd::fit::FitArgs;
+pub use crate::cmd::fit::{FitMade, Open};
+use crate::cmd::noise::NoiseInUseArgs;
+use crate::cmd::thermal::FitArgs as ThermalFitArgs;
+pub use crate::cmd::verify::Verified;
+use crate::cmd::verify::VerifyArgs;
 use crate::cmd::wizard::{WizardArgs, session};
 use crate::hint;
 use crate::importing::{ImportArgs, imported};
+use crate::reading::OF_A_LOG;
 
 /// Why a call was refused.
 #[derive(Debug)]
@@ -48,6 +67,106 @@ pub fn import(arguments: Vec<OsString>) -> Result<ImportSummary, Refusal> {
 /// See [`Refusal`].
 pub fn design(arguments: Vec<OsString>) -> Result<(Designed, Option<String>), Refusal> {
     Ok(parsed::<DesignArgs>("design", arguments)?.made()?)
+}
+
+/// The fit of the recording that `open` reads, with the arguments of `mimu fit` but the recording and the noise.
+///
+/// # Errors
+/// See [`Refusal`].
+pub fn fit(
+    arguments: Vec<OsString>,
+    open: &Open,
+    noise: Option<&NoiseFile>,
+) -> Result<FitMade, Refusal> {
+    Ok(of_recording::<FitArgs>("fit", arguments)?.fitted(open, noise)?)
+}
+
+/// One calibration of the sessions that `open` reads, as [`fit`].
+///
+/// # Errors
+/// See [`Refusal`].
+pub fn fit_sessions(
+    arguments: Vec<OsString>,
+    open: &[Box<Open>],
+    noise: Option<&NoiseFile>,
+) -> Result<(SessionsResult, Calibration), Refusal> {
+    Ok(of_recording::<FitArgs>("fit", arguments)?.combined(open, noise)?)
+}
+
+/// A calibration judged by the recording that `open` reads, with the arguments of `mimu verify` but the files.
+///
+/// # Errors
+/// See [`Refusal`].
+pub fn verify(
+    mut arguments: Vec<OsString>,
+    open: &Open,
+    noise: Option<&NoiseFile>,
+    calibration: &Calibration,
+) -> Result<Verified, Refusal> {
+    arguments.push("--calibration=given".into());
+    let args = of_recording::<VerifyArgs>("verify", arguments)?;
+    Ok(args.judged(open, noise, calibration)?)
+}
+
+/// The diagnosis of the recordings that `open` reads, with the arguments of `mimu diagnose` but the files. `second` judges only; `given` is a calibration
+/// that is kept, with its name.
+///
+/// # Errors
+/// See [`Refusal`].
+pub fn diagnose(
+    arguments: Vec<OsString>,
+    open: &[Box<Open>],
+    second: Option<&Open>,
+    noise: Option<&NoiseFile>,
+    given: Option<(&Calibration, &str)>,
+    created: &str,
+) -> Result<Diagnosed, Refusal> {
+    let args = of_recording::<DiagnoseArgs>("diagnose", arguments)?;
+    let all: Result<Vec<Prepared>, Error> = open.iter().map(|o| args.opened(o, noise)).collect();
+    let mut all = all?;
+    let second = second.map(|open| args.opened(open, noise)).transpose()?;
+    let name = second.as_ref().map(|second| second.manifest.device.clone());
+    let recordings = Recordings {
+        first: all.remove(0),
+        more: all,
+        second,
+        given: given.map(|(model, _)| model),
+        accept: args.accept,
+    };
+    let names = [name.as_deref(), given.map(|(_, name)| name)];
+    Ok(diagnosed(recordings, names, created, &|_| ())?)
+}
+
+/// What `mimu allan` with these arguments surveys, and how.
+///
+/// # Errors
+/// See [`Refusal`].
+pub fn allan(arguments: Vec<OsString>) -> Result<survey::Options, Refusal> {
+    Ok(of_recording::<AllanArgs>("allan", arguments)?.options()?)
+}
+
+/// Noise in use, with the arguments of `mimu noise` but the recording and the files of the unit.
+///
+/// # Errors
+/// See [`Refusal`].
+pub fn noise_in_use(
+    mut arguments: Vec<OsString>,
+    recording: &Recording,
+    calibration: &Calibration,
+    noise: &NoiseFile,
+) -> Result<NoiseInUse, Refusal> {
+    arguments.push("--noise=given".into());
+    let args = of_recording::<NoiseInUseArgs>("noise", arguments)?;
+    Ok(args.found(recording, calibration, noise, &|_| ())?)
+}
+
+/// How dwells are found and curves estimated by `mimu thermal fit` with these arguments.
+///
+/// # Errors
+/// See [`Refusal`].
+pub fn thermal_fit(arguments: Vec<OsString>) -> Result<(DwellSearch, ThermalOptions), Refusal> {
+    let args = of_recording::<ThermalFitArgs>("fit", arguments)?;
+    Ok((args.search(), args.options()))
 }
 
 /// File of `mimu export`; its arguments begin with the name of the format.
@@ -96,14 +215,28 @@ pub fn wizard(
     }))
 }
 
-/// Names of the options of `subcommand`, such as `rate-hz` and `n`.
+/// Names of the options of `subcommand`, such as `rate-hz` and `n`, without those of a log; `subcommand` may be one of another, such as `thermal fit`.
 pub fn options(subcommand: &str) -> Vec<String> {
     let command = Cli::command();
-    let found = command.find_subcommand(subcommand);
+    let mut words = subcommand.split_whitespace();
+    let found = words.try_fold(&command, |command, word| command.find_subcommand(word));
     let arguments = found.into_iter().flat_map(clap::Command::get_arguments);
+    let arguments = arguments.filter(|a| a.get_help_heading() != Some(OF_A_LOG));
     let long = |a: &clap::Arg| a.get_long().map(str::to_owned);
     let named = |a| long(a).or_else(|| a.get_short().map(String::from));
     arguments.filter_map(named).collect()
+}
+
+/// Flags of the command that change what `error` is about, such as `--rate-hz`.
+pub fn flags(error: &Error) -> Vec<&'static str> {
+    let arguments = &error.refused().arguments;
+    arguments.iter().filter_map(|a| hint::flag(*a)).collect()
+}
+
+/// Arguments of a command that names a recording, which the caller has at hand.
+fn of_recording<A: Args>(name: &'static str, mut arguments: Vec<OsString>) -> Result<A, Refusal> {
+    arguments.push("given".into());
+    parsed(name, arguments)
 }
 
 fn parsed<A: Args>(name: &'static str, arguments: Vec<OsString>) -> Result<A, Refusal> {
@@ -116,7 +249,8 @@ fn parsed<A: Args>(name: &'static str, arguments: Vec<OsString>) -> Result<A, Re
 /// clap's message about invalid arguments, in one line.
 fn usage(error: clap::Error) -> Refusal {
     let text = error.render().to_string();
-    let said = text.lines().take_while(|line| !line.starts_with("Usage:"));
+    let about_help = |line: &&str| line.starts_with("Usage:") || line.starts_with("For more");
+    let said = text.lines().take_while(|line| !about_help(line));
     let said: Vec<&str> = said
         .map(str::trim)
         .filter(|line| !line.is_empty())

@@ -1,5 +1,8 @@
 //! Adds the flags of the command line to errors and warnings of the libraries.
 
+use std::sync::atomic::Ordering;
+
+use clap::Args;
 use mimu::diagnose::rejected::{Reason, Rejected};
 use mimu::warning::Warning;
 use mimu_recording::error::{Argument, Error};
@@ -7,28 +10,8 @@ use mimu_recording::health::Fault;
 use mimu_thermal::warning::Warning as OverTemperature;
 use mimu_wizard::waiting::Waiting;
 
-/// Flags of the import. They are a remedy after any command that reads a recording; other flags only after the command that refused.
-const OF_THE_IMPORT: [&str; 19] = [
-    "--columns",
-    "--rate-hz",
-    "--time-unit",
-    "--scale",
-    "--offset",
-    "--reference",
-    "--rate-dps",
-    "--rate-error",
-    "--where",
-    "--comment",
-    "--separator",
-    "--twos-complement",
-    "--topic",
-    "--instance",
-    "--preset",
-    "--means",
-    "--skip-broken",
-    "--signed-low-byte",
-    "--trust-readings",
-];
+use crate::importing::LogOptions;
+use crate::reading::{LOG_IS_READ, OF_A_LOG};
 
 /// The error in one line, with the flags of `command` that can remedy it. Several commands can cause the same refusal, and a flag that the present
 /// one lacks is no remedy.
@@ -40,18 +23,24 @@ pub(crate) fn line(error: &Error, command: &clap::Command) -> String {
             return Some(flag.to_string());
         }
         let first = flag.split([',', ' ']).next()?;
-        let has = command
+        let is_it = |a: &&clap::Arg| match first.strip_prefix("--") {
+            Some(long) => a.get_long() == Some(long),
+            None => a.get_short() == first.chars().nth(1),
+        };
+        // What is wrong with a recording that was imported before is put right by another import.
+        let import = LogOptions::augment_args(clap::Command::new("import"));
+        let imported = import
             .get_arguments()
-            .any(|a| match first.strip_prefix("--") {
-                Some(long) => a.get_long() == Some(long),
-                None => a.get_short() == first.chars().nth(1),
-            });
-        match has {
-            true => Some(flag.to_string()),
-            false if OF_THE_IMPORT.contains(&flag) => Some(format!("mimu import {flag}")),
+            .any(|a| is_it(&a))
+            .then(|| format!("mimu import {flag}"));
+        let log = LOG_IS_READ.load(Ordering::Relaxed);
+        match command.get_arguments().find(is_it) {
+            Some(a) if log || a.get_help_heading() != Some(OF_A_LOG) => Some(flag.to_string()),
+            Some(_) => imported,
+            None if imported.is_some() => imported,
             // A diagnosis needs both sensors; only a fit accepts one.
-            false if flag == "--only" => Some(format!("mimu fit {flag}")),
-            false => None,
+            None if flag == "--only" => Some(format!("mimu fit {flag}")),
+            None => None,
         }
     };
     let flags: Vec<String> = arguments
@@ -98,7 +87,7 @@ pub(crate) fn of_rejected(rejected: &Rejected) -> String {
     }
 }
 
-fn flag(argument: Argument) -> Option<&'static str> {
+pub(crate) fn flag(argument: Argument) -> Option<&'static str> {
     Some(match argument {
         Argument::Columns => "--columns",
         Argument::SampleRate => "--rate-hz",
@@ -129,7 +118,7 @@ fn flag(argument: Argument) -> Option<&'static str> {
         Argument::Comment => "--comment",
         Argument::Separator => "--separator",
         Argument::TwosComplement => "--twos-complement",
-        Argument::Rows => "--rows of mimu import",
+        Argument::Rows => "--rows",
         Argument::Instance => "--instance",
         Argument::Preset => "--preset",
         Argument::Means => "--means",
@@ -235,6 +224,11 @@ mod tests {
         let error = Error::new("REC", "another rate", "give it").about(Argument::SampleRate);
         let said = "REC: another rate; give it (mimu import --rate-hz)";
         assert_eq!(line(&error, &lacks), said);
+        let of_a_log = clap::Arg::new("rate-hz")
+            .long("rate-hz")
+            .help_heading(OF_A_LOG);
+        let takes_a_log = clap::Command::new("fit").arg(of_a_log);
+        assert_eq!(line(&error, &takes_a_log), said);
         let error = Error::new("REC", "no rates", "fit the accel alone").about(Argument::Only);
         let said = "REC: no rates; fit the accel alone (mimu fit --only)";
         assert_eq!(line(&error, &lacks), said);

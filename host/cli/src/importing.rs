@@ -1,11 +1,10 @@
 //! Imports: of `mimu import`, and of logs that other commands take in place of a recording.
 
-use std::ffi::OsString;
 use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
 
-use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use clap::{Args, CommandFactory};
 use mimu::quantity::normal_gravity;
 use mimu::warning::Warning;
 use mimu_recording::error::{Error, Result};
@@ -17,6 +16,7 @@ use mimu_recording::{
     Turntable, TurntableRate, TwosComplement, Zero, import, is_log, rate_error,
 };
 
+use crate::Cli;
 use crate::arguments::JsonArgs;
 use crate::output::{check_outputs, progress, quoted};
 
@@ -26,6 +26,40 @@ pub(crate) struct ImportArgs {
     /// folder of a preset; later files are interpolated at the times of the first
     #[arg(required_unless_present = "faces")]
     files: Vec<PathBuf>,
+    #[command(flatten)]
+    log: LogOptions,
+    /// The files follow one another, like those of six faces: each is a dwell with the name of its file; one list of columns applies to all
+    #[arg(long, conflicts_with_all = ["means", "step_gap"])]
+    sequence: bool,
+    /// One file for each face, named with the axis that was up: `--faces +x=a.csv -x=b.csv +y=c.csv -y=d.csv +z=e.csv -z=f.csv`; with
+    /// --reference table the faces give the specific forces
+    #[arg(long, conflicts_with_all = ["means", "sequence", "inputs", "step_gap"])]
+    faces: bool,
+    /// With --faces: the file with x down
+    #[arg(short = 'x', value_name = "FILE", requires = "faces")]
+    x_down: Vec<PathBuf>,
+    /// With --faces: the file with y down
+    #[arg(short = 'y', value_name = "FILE", requires = "faces")]
+    y_down: Vec<PathBuf>,
+    /// With --faces: the file with z down
+    #[arg(short = 'z', value_name = "FILE", requires = "faces")]
+    z_down: Vec<PathBuf>,
+    /// Format of the samples: parquet or csv
+    #[arg(long, default_value = "parquet")]
+    format: SampleFormat,
+    /// Replace an existing recording
+    #[arg(long)]
+    replace: bool,
+    /// Directory of the new recording
+    #[arg(short, value_name = "DIR")]
+    output: PathBuf,
+    #[command(flatten)]
+    pub(crate) json: JsonArgs,
+}
+
+/// What the person knows of a log: options of every command that takes one.
+#[derive(Args, Default, Clone)]
+pub(crate) struct LogOptions {
     /// Columns of a file from the left (`t_s,accel_x,-`; `-` skips one), or by the names in its header (`gyro_x=wx,t_s=time`); one list for
     /// each file, or several for a file with a sensor in other columns or rows (--where)
     ///
@@ -40,24 +74,13 @@ pub(crate) struct ImportArgs {
     /// samples (`averaged`, `accel_x_averaged`), inputs (ref_ columns) and names (`step`)
     #[arg(long)]
     means: bool,
-    /// The files follow one another, like those of six faces: each is a dwell with the name of its file; one list of columns applies to all
-    #[arg(long, conflicts_with = "means")]
-    sequence: bool,
-    /// One file for each face, named with the axis that was up: `--faces +x=a.csv -x=b.csv +y=c.csv -y=d.csv +z=e.csv -z=f.csv`; with
-    /// --reference table the faces give the specific forces
-    #[arg(long, conflicts_with_all = ["means", "sequence", "inputs"])]
-    faces: bool,
-    /// With --faces: the file with x down
-    #[arg(short = 'x', value_name = "FILE", requires = "faces")]
-    x_down: Vec<PathBuf>,
-    /// With --faces: the file with y down
-    #[arg(short = 'y', value_name = "FILE", requires = "faces")]
-    y_down: Vec<PathBuf>,
-    /// With --faces: the file with z down
-    #[arg(short = 'z', value_name = "FILE", requires = "faces")]
-    z_down: Vec<PathBuf>,
     /// A pause of more than this number of seconds begins a new dwell, for files without rows between the poses
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, conflicts_with_all = ["means", "sequence", "faces"])]
+    #[arg(
+        long,
+        value_name = "SECONDS",
+        allow_negative_numbers = true,
+        conflicts_with = "means"
+    )]
     step_gap: Option<f64>,
     /// Import only the rows in which a column has this value, for one of several sensors in a file: `channel=3`; if repeated, a row must
     /// satisfy all, unless they are values of one column: then each belongs to a list of --columns
@@ -75,7 +98,7 @@ pub(crate) struct ImportArgs {
     time_unit: Option<Decimal>,
     /// Local gravity, m/s² [default: normal gravity at sea level at --latitude, or 9.80665 with a warning]
     #[arg(long, allow_negative_numbers = true)]
-    gravity: Option<f64>,
+    pub(crate) gravity: Option<f64>,
     /// Unit of the raw columns, after --scale: V, count or SI (rad/s and m/s²) [default of bags, logs and most presets: SI]
     #[arg(long, value_name = "UNIT")]
     raw_unit: Option<RawUnit>,
@@ -130,7 +153,7 @@ pub(crate) struct ImportArgs {
     device: Option<String>,
     /// Latitude, degrees
     #[arg(long, allow_negative_numbers = true)]
-    latitude: Option<f64>,
+    pub(crate) latitude: Option<f64>,
     /// CSV file with the known input of each dwell or turn: step, ref_rate_x_dps.., ref_force_x_mps2.., turn_x_deg..
     ///
     /// One row for each number or label of the column step; leave unknown inputs empty: `step,turn_x_deg,ref_force_x_mps2`, then
@@ -149,17 +172,6 @@ pub(crate) struct ImportArgs {
     /// Use the readings although they look like those of two devices in turn, wrongly coded, or of another range from some row on
     #[arg(long, conflicts_with = "means")]
     trust_readings: bool,
-    /// Format of the samples: parquet or csv
-    #[arg(long, default_value = "parquet")]
-    format: SampleFormat,
-    /// Replace an existing recording
-    #[arg(long)]
-    replace: bool,
-    /// Directory of the new recording
-    #[arg(short, value_name = "DIR")]
-    output: PathBuf,
-    #[command(flatten)]
-    pub(crate) json: JsonArgs,
 }
 
 fn presets() -> impl TypedValueParser<Value = Preset> {
@@ -226,7 +238,7 @@ fn look_at(args: &mut ImportArgs, files: &[PathBuf]) -> Result<Option<Look>> {
             return Err(refusal);
         }
         // The person has named the columns, so there is nothing to look for.
-        if !args.columns.is_empty() {
+        if !args.log.columns.is_empty() {
             return Ok(None);
         }
     }
@@ -250,31 +262,39 @@ fn ask(args: &mut ImportArgs, look: &Look) -> Result<bool> {
         }
         match option {
             "--units" => {
-                let before = args.units.take().map_or(String::new(), |units| units + ",");
-                args.units = Some(before + answer);
+                let before = args
+                    .log
+                    .units
+                    .take()
+                    .map_or(String::new(), |units| units + ",");
+                args.log.units = Some(before + answer);
             }
             "--rate-hz" => {
                 let number = answer.trim_end_matches("Hz").trim().parse();
                 let problem = format!("{answer:?} is no number");
                 let refused = |_| Error::new("--rate-hz", problem, "write samples a second");
-                args.rate_hz = Some(number.map_err(refused)?);
+                args.log.rate_hz = Some(number.map_err(refused)?);
             }
             "--columns" => {
-                args.columns.push(answer.parse()?);
+                args.log.columns.push(answer.parse()?);
                 let separator = look.files.iter().find_map(|file| file.separator);
-                args.separator = args.separator.or(separator);
+                args.log.separator = args.log.separator.or(separator);
             }
-            "--time-unit" => args.time_unit = Some(answer.parse()?),
+            "--time-unit" => args.log.time_unit = Some(answer.parse()?),
             _ => return Ok(false),
         }
     }
     Ok(true)
 }
 
-/// The command to complete.
+/// The command to complete: as it was typed, or the import of these files if another program called.
 fn typed(files: &[PathBuf]) -> String {
     let typed: Vec<String> = std::env::args().skip(1).map(|a| quoted(&a)).collect();
-    match typed.first().is_some_and(|first| first == "import") {
+    let command = Cli::command();
+    match typed
+        .first()
+        .is_some_and(|first| command.find_subcommand(first).is_some())
+    {
         true => format!("mimu {}", typed.join(" ")),
         false => format!(
             "mimu import {} -o DIR",
@@ -284,18 +304,18 @@ fn typed(files: &[PathBuf]) -> String {
 }
 
 fn look(args: &ImportArgs, files: &[PathBuf]) -> Result<Look> {
-    let converted = !args.twos_complement.is_empty()
-        || !args.zero.is_empty()
-        || !args.signed_low_byte.is_empty();
-    let scaled = args.scale.iter().any(Scale::is_of_readings);
+    let converted = !args.log.twos_complement.is_empty()
+        || !args.log.zero.is_empty()
+        || !args.log.signed_low_byte.is_empty();
+    let scaled = args.log.scale.iter().any(Scale::is_of_readings);
     let mut given = Given {
         // A factor may also come before the unit: twice the readings in deg/s.
-        raw_unit: args.raw_unit.is_some() || converted || scaled && args.units.is_none(),
-        rate: args.rate_hz.is_some(),
-        time_unit: args.time_unit,
+        raw_unit: args.log.raw_unit.is_some() || converted || scaled && args.log.units.is_none(),
+        rate: args.log.rate_hz.is_some(),
+        time_unit: args.log.time_unit,
         ..Given::default()
     };
-    if let Some(units) = &args.units {
+    if let Some(units) = &args.log.units {
         given = given.with_units(units)?;
     }
     // Files of a sequence are alike; joined ones are looked at together.
@@ -303,12 +323,12 @@ fn look(args: &ImportArgs, files: &[PathBuf]) -> Result<Look> {
         true => &files[..files.len().min(1)],
         false => files,
     };
-    Look::at(together, args.separator, &given)
+    Look::at(together, args.log.separator, &given)
 }
 
 /// Unit of readings whose columns are given, by `--units`; their conversion is added to the factors.
 fn by_units(args: &mut ImportArgs, preset: Option<&Chosen>) -> Result<Option<RawUnit>> {
-    let Some(units) = &args.units else {
+    let Some(units) = &args.log.units else {
         return Ok(None);
     };
     if let Some(preset) = preset.filter(|preset| preset.raw_unit.is_some()) {
@@ -322,7 +342,7 @@ fn by_units(args: &mut ImportArgs, preset: Option<&Chosen>) -> Result<Option<Raw
     let (unit, factors) = Given::default().with_units(units)?.conversion()?;
     for (sensor, factor) in ["gyro", "accel"].into_iter().zip(factors) {
         if let Some(factor) = factor.filter(|factor| *factor != 1.0) {
-            args.scale.push(format!("{sensor}={factor}").parse()?);
+            args.log.scale.push(format!("{sensor}={factor}").parse()?);
         }
     }
     Ok(Some(unit))
@@ -332,26 +352,26 @@ fn by_units(args: &mut ImportArgs, preset: Option<&Chosen>) -> Result<Option<Raw
 pub(crate) fn imported_log(
     file: &Path,
     out: &Path,
-    options: Vec<OsString>,
+    options: &LogOptions,
 ) -> Result<(ImportSummary, ImportOptions)> {
-    #[derive(clap::Parser)]
-    struct Alone {
-        #[command(flatten)]
-        import: ImportArgs,
-    }
-    let words = [
-        OsString::from("import"),
-        file.into(),
-        "-o".into(),
-        out.into(),
-    ];
-    let words = words.into_iter().chain(options);
-    imported(<Alone as clap::Parser>::parse_from(words).import)
+    imported(ImportArgs {
+        files: vec![file.to_owned()],
+        log: options.clone(),
+        sequence: false,
+        faces: false,
+        x_down: Vec::new(),
+        y_down: Vec::new(),
+        z_down: Vec::new(),
+        format: SampleFormat::Parquet,
+        replace: false,
+        output: out.to_owned(),
+        json: JsonArgs { path: None },
+    })
 }
 
 /// Size of gravity, m/s², and what is said where it is assumed.
 fn gravity_of(args: &ImportArgs, reference: Reference) -> (f64, Option<String>) {
-    match (args.gravity, args.latitude) {
+    match (args.log.gravity, args.log.latitude) {
         (Some(gravity), latitude) => {
             let off = latitude.and_then(|at| Warning::of_gravity(gravity, at));
             (gravity, off.map(|w| w.to_string()))
@@ -365,13 +385,14 @@ fn gravity_of(args: &ImportArgs, reference: Reference) -> (f64, Option<String>) 
 /// Takes over what a look at the files has found, where the command leaves it open.
 fn take_look(args: &mut ImportArgs, look: &Look, faces: bool) {
     // One list holds for all files that follow one another.
-    args.columns = look.columns();
+    args.log.columns = look.columns();
     if args.sequence || faces {
-        args.columns.truncate(1);
+        args.log.columns.truncate(1);
     }
-    args.scale.extend(look.scales.iter().cloned());
-    args.time_unit = args.time_unit.or(look.time_unit());
-    args.separator = args
+    args.log.scale.extend(look.scales.iter().cloned());
+    args.log.time_unit = args.log.time_unit.or(look.time_unit());
+    args.log.separator = args
+        .log
         .separator
         .or(look.files.iter().find_map(|f| f.separator));
 }
@@ -389,14 +410,14 @@ fn low_rate(summary: &ImportSummary) -> Option<String> {
 /// Makes the recording, and prints nothing. Returns the options that say everything as well.
 pub(crate) fn imported(mut args: ImportArgs) -> Result<(ImportSummary, ImportOptions)> {
     let (files, faces) = faces(&args)?;
-    let chosen = match (&args.preset, args.columns.is_empty()) {
+    let chosen = match (&args.log.preset, args.log.columns.is_empty()) {
         (None, false) => None,
-        (named, _) => Preset::choose(*named, &files, args.separator)?,
+        (named, _) => Preset::choose(*named, &files, args.log.separator)?,
     };
     let logs = files.iter().all(|file| is_log(file));
     let looked = match (
-        chosen.is_some() || logs || args.means,
-        args.columns.is_empty(),
+        chosen.is_some() || logs || args.log.means,
+        args.log.columns.is_empty(),
     ) {
         (false, true) => look_at(&mut args, &files)?,
         _ => None,
@@ -405,14 +426,18 @@ pub(crate) fn imported(mut args: ImportArgs) -> Result<(ImportSummary, ImportOpt
         Some(_) => None,
         None => by_units(&mut args, chosen.as_ref())?,
     };
-    let known = args.inputs.is_some() || looked.as_ref().is_some_and(Look::has_reference);
-    let reference = args.reference.unwrap_or(match (args.rate_error, known) {
-        (Some(_), _) => Reference::TurntableRate,
-        (None, true) => Reference::Table,
-        (None, false) => Reference::Gravity,
-    });
+    let known = args.log.inputs.is_some() || looked.as_ref().is_some_and(Look::has_reference);
+    let reference = args
+        .log
+        .reference
+        .unwrap_or(match (args.log.rate_error, known) {
+            (Some(_), _) => Reference::TurntableRate,
+            (None, true) => Reference::Table,
+            (None, false) => Reference::Gravity,
+        });
     let (gravity, assumed) = gravity_of(&args, reference);
     let raw_unit = args
+        .log
         .raw_unit
         .or(by_units)
         .or(chosen.as_ref().and_then(|chosen| chosen.raw_unit))
@@ -433,32 +458,33 @@ pub(crate) fn imported(mut args: ImportArgs) -> Result<(ImportSummary, ImportOpt
         take_look(&mut args, look, !faces.is_empty());
     }
     let options = ImportOptions {
-        topics: args.topic,
-        instance: args.instance,
-        twos_complements: args.twos_complement,
-        zeros: args.zero,
-        step_gap_s: args.step_gap,
+        topics: args.log.topic,
+        instance: args.log.instance,
+        twos_complements: args.log.twos_complement,
+        zeros: args.log.zero,
+        step_gap_s: args.log.step_gap,
         turntable: args
+            .log
             .rate_error
-            .map(|error| Turntable::new(&args.rate_dps, error)),
-        columns: args.columns,
-        separator: args.separator,
-        comments: args.comment,
-        rate_hz: args.rate_hz,
-        scales: args.scale,
-        offsets: args.offset,
-        signed_low_bytes: args.signed_low_byte,
-        time_unit: args.time_unit,
-        device: args.device,
-        latitude_deg: args.latitude,
-        inputs: args.inputs,
-        means: args.means,
+            .map(|error| Turntable::new(&args.log.rate_dps, error)),
+        columns: args.log.columns,
+        separator: args.log.separator,
+        comments: args.log.comment,
+        rate_hz: args.log.rate_hz,
+        scales: args.log.scale,
+        offsets: args.log.offset,
+        signed_low_bytes: args.log.signed_low_byte,
+        time_unit: args.log.time_unit,
+        device: args.log.device,
+        latitude_deg: args.log.latitude,
+        inputs: args.log.inputs,
+        means: args.log.means,
         sequence: args.sequence,
         faces,
-        filters: args.filters,
-        rows: args.rows,
-        skip_broken: args.skip_broken.unwrap_or_default(),
-        trust_readings: args.trust_readings,
+        filters: args.log.filters,
+        rows: args.log.rows,
+        skip_broken: args.log.skip_broken.unwrap_or_default(),
+        trust_readings: args.log.trust_readings,
         format: args.format,
         replace: args.replace,
         ..ImportOptions::new(files, gravity, raw_unit, reference)

@@ -1,7 +1,7 @@
 //! Reads the recording of a subcommand.
 
-use std::ffi::OsString;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use clap::Args;
@@ -11,59 +11,36 @@ use mimu_recording::error::{Error, Result};
 use mimu_recording::{ImportOptions, MANIFEST_FILE, PoseMeans, Recording};
 use tempfile::TempDir;
 
-use crate::importing::imported_log;
+use crate::importing::{LogOptions, imported_log};
 use crate::output::{check_outputs, progress};
 use crate::report;
+
+/// Heading of [`LogArgs`] in a help.
+pub(crate) const OF_A_LOG: &str = "A log in place of the recording";
 
 /// What a log that is given in place of a recording does not say, and where its recording is kept.
 #[derive(Args, Default, Clone)]
 pub(crate) struct LogArgs {
-    /// If a log is given in place of the recording: directory in which to keep the recording that is made of it
+    /// Directory in which to keep the recording that is made of the log
     #[arg(long = "save", value_name = "DIR")]
     folder: Option<PathBuf>,
-    /// Local gravity of a log, m/s² [default: normal gravity at --latitude, or 9.80665 with a warning]
-    #[arg(long, value_name = "MPS2", allow_negative_numbers = true)]
-    gravity: Option<f64>,
-    /// Latitude of a log, degrees
-    #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
-    latitude: Option<f64>,
-    /// Units of a log, as of `mimu import`: `g,deg/s`
-    #[arg(long, value_name = "G,DEG/S")]
-    units: Option<String>,
+    #[command(flatten)]
+    pub(crate) options: LogOptions,
 }
 
 impl LogArgs {
     /// With the gravity of a calibration that judges the log, unless the person knows a better one.
     pub(crate) fn or_gravity(&self, known: Option<f64>) -> Self {
-        let given = self.gravity.is_some() || self.latitude.is_some();
-        Self {
-            gravity: self.gravity.or(known.filter(|_| !given)),
-            ..self.clone()
+        let mut with = self.clone();
+        if with.options.latitude.is_none() {
+            with.options.gravity = with.options.gravity.or(known);
         }
-    }
-
-    /// Local gravity, m/s², if it is given.
-    #[cfg(not(target_family = "wasm"))]
-    pub(crate) fn gravity_mps2(&self) -> Option<f64> {
-        self.gravity
-    }
-
-    /// Latitude, degrees, if it is given.
-    #[cfg(not(target_family = "wasm"))]
-    pub(crate) fn latitude_deg(&self) -> Option<f64> {
-        self.latitude
-    }
-
-    /// The options of `mimu import`.
-    fn options(&self) -> Vec<OsString> {
-        let numbers = [("--gravity", self.gravity), ("--latitude", self.latitude)];
-        let numbers = numbers
-            .into_iter()
-            .filter_map(|(option, value)| Some(format!("{option}={}", value?)));
-        let units = self.units.iter().map(|units| format!("--units={units}"));
-        numbers.chain(units).map(OsString::from).collect()
+        with
     }
 }
+
+/// Whether the command was given a log, so that options of the import apply to it.
+pub(crate) static LOG_IS_READ: AtomicBool = AtomicBool::new(false);
 
 /// Folders of logs that were given in place of recordings; see [`remove_logs`].
 static LOGS: Mutex<Vec<TempDir>> = Mutex::new(Vec::new());
@@ -93,7 +70,8 @@ pub(crate) fn imported_to(path: &Path, log: &LogArgs) -> Result<(PathBuf, Import
         Some(folder) => folder.clone(),
         None => scratch()?.join(path.file_name().unwrap_or_default()),
     };
-    let (mut summary, options) = imported_log(path, &out, log.options())?;
+    LOG_IS_READ.store(true, Ordering::Relaxed);
+    let (mut summary, options) = imported_log(path, &out, &log.options)?;
     // Its folder is of no interest.
     if log.folder.is_none() {
         summary.recording = path.display().to_string();

@@ -86,11 +86,14 @@ pub(crate) struct AcceptArgs {
     #[arg(short, value_name = "DIR")]
     output: Option<PathBuf>,
     #[command(flatten)]
-    log: LogArgs,
-    #[command(flatten)]
     verbose: VerboseArgs,
     #[command(flatten)]
     json: JsonArgs,
+    #[command(
+        flatten,
+        next_help_heading = "Gravity, and a log in place of a recording"
+    )]
+    log: LogArgs,
 }
 
 #[derive(Clone, Copy, ValueEnum)]

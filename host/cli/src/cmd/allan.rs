@@ -15,7 +15,7 @@ use mimu_recording::{MANIFEST_FILE, Recording};
 
 use crate::arguments::{JsonArgs, StrictArgs, VerboseArgs};
 use crate::output::{check_outputs, now, print, progress};
-use crate::reading::{LogArgs, open};
+use crate::reading::{LogArgs, OF_A_LOG, open};
 use crate::status::Status;
 
 #[derive(Args)]
@@ -53,13 +53,13 @@ pub struct AllanArgs {
     #[arg(short, value_name = "FILE")]
     output: Option<PathBuf>,
     #[command(flatten)]
-    log: LogArgs,
-    #[command(flatten)]
     strict: StrictArgs,
     #[command(flatten)]
     verbose: VerboseArgs,
     #[command(flatten)]
     json: JsonArgs,
+    #[command(flatten, next_help_heading = OF_A_LOG)]
+    log: LogArgs,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -83,6 +83,33 @@ fn confidence(text: &str) -> std::result::Result<f64, String> {
     match text.parse() {
         Ok(p) if (0.5..=0.999).contains(&p) => Ok(p),
         _ => Err("write a probability from 0.5 to 0.999".into()),
+    }
+}
+
+impl AllanArgs {
+    /// What is surveyed, and how.
+    ///
+    /// # Errors
+    /// The segment ends before it begins.
+    pub(crate) fn options(&self) -> Result<Options> {
+        Ok(Options {
+            part: match (self.step, self.from, self.to) {
+                (Some(step), ..) => Part::Step(step),
+                (None, None, None) => Part::Whole,
+                (None, Some(from), Some(to)) if from >= to => {
+                    let problem = format!("{from} s is not before {to} s");
+                    return Err(Error::new("--from, --to", problem, "exchange them"));
+                }
+                (None, from_s, to_s) => Part::Span { from_s, to_s },
+            },
+            kind: match self.kind {
+                KindArg::Allan => Deviation::Allan,
+                KindArg::Modified => Deviation::Modified,
+                KindArg::Hadamard => Deviation::Hadamard,
+            },
+            per_decade: usize::from(self.per_decade),
+            confidence: self.confidence,
+        })
     }
 }
 
@@ -112,15 +139,7 @@ pub fn run(args: &AllanArgs) -> Result<Status> {
             "plot one recording at a time",
         ));
     }
-    if let (Some(from), Some(to)) = (args.from, args.to)
-        && from >= to
-    {
-        return Err(Error::new(
-            "--from, --to",
-            format!("{from} s is not before {to} s"),
-            "exchange them",
-        ));
-    }
+    let options = args.options()?;
     let recordings: Vec<Recording> = args
         .recordings
         .iter()
@@ -146,20 +165,6 @@ pub fn run(args: &AllanArgs) -> Result<Status> {
         .as_deref()
         .map(Calibration::read)
         .transpose()?;
-    let options = Options {
-        part: match (args.step, args.from, args.to) {
-            (Some(step), ..) => Part::Step(step),
-            (None, None, None) => Part::Whole,
-            (None, from_s, to_s) => Part::Span { from_s, to_s },
-        },
-        kind: match args.kind {
-            KindArg::Allan => Deviation::Allan,
-            KindArg::Modified => Deviation::Modified,
-            KindArg::Hadamard => Deviation::Hadamard,
-        },
-        per_decade: usize::from(args.per_decade),
-        confidence: args.confidence,
-    };
     let bar = progress("reading and averaging");
     let surveys = survey_all(&recordings, calibration.as_ref(), options, |share| {
         bar.reach(share);

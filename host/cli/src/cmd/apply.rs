@@ -10,7 +10,7 @@ use mimu_recording::{CopiedTable, MANIFEST_FILE, Recording, SampleFormat};
 
 use crate::arguments::JsonArgs;
 use crate::output::{check_outputs, print, progress};
-use crate::reading::{LogArgs, imported_to, named, open};
+use crate::reading::{LogArgs, OF_A_LOG, imported_to, named, open};
 use crate::report;
 
 #[derive(Args)]
@@ -30,9 +30,9 @@ pub(crate) struct ApplyArgs {
     #[arg(short, value_name = "DIR|FILE.csv")]
     output: PathBuf,
     #[command(flatten)]
-    log: LogArgs,
-    #[command(flatten)]
     json: JsonArgs,
+    #[command(flatten, next_help_heading = OF_A_LOG)]
+    log: LogArgs,
 }
 
 pub(crate) fn run(args: &ApplyArgs) -> Result<()> {

@@ -7,17 +7,20 @@ use clap::Args;
 use mimu::calibration::Calibration;
 use mimu::diagnose::Recordings;
 use mimu::diagnosed::{Diagnosed, diagnosed};
+use mimu::noise::noise_file::NoiseFile;
 use mimu::plan::next_experiment;
 use mimu::prepared::Prepared;
 use mimu::recording_problem::OfRecording;
+use mimu::signal::stillness::DwellSearch;
 use mimu_recording::error::Result;
 use mimu_recording::result_file::stage;
 
 use crate::arguments::{
     JsonArgs, KeepArgs, NoiseArgs, StillArgs, StrictArgs, VerboseArgs, WholeTurnArgs, WritingArgs,
+    with_noise,
 };
 use crate::output::{now, print, progress};
-use crate::reading::{LogArgs, read};
+use crate::reading::{LogArgs, OF_A_LOG, read};
 use crate::report::refused;
 use crate::status::Status;
 
@@ -37,7 +40,7 @@ pub struct DiagnoseArgs {
     calibration: Option<PathBuf>,
     /// Accept this product (`term:...`) on the evidence of this recording alone
     #[arg(long, value_name = "ID")]
-    accept: Vec<String>,
+    pub(crate) accept: Vec<String>,
     /// Calibration file to write, with the effects that were found
     #[arg(short, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -50,8 +53,6 @@ pub struct DiagnoseArgs {
     /// Print the experiments for what this recording could not show or distinguish
     #[arg(long)]
     next: bool,
-    #[command(flatten)]
-    log: LogArgs,
     #[command(flatten)]
     still: StillArgs,
     #[command(flatten)]
@@ -68,6 +69,20 @@ pub struct DiagnoseArgs {
     verbose: VerboseArgs,
     #[command(flatten)]
     json: JsonArgs,
+    #[command(flatten, next_help_heading = OF_A_LOG)]
+    log: LogArgs,
+}
+
+impl DiagnoseArgs {
+    /// The recording that `open` reads, with all that the arguments state.
+    pub(crate) fn opened(
+        &self,
+        open: &dyn Fn(DwellSearch) -> Result<Prepared>,
+        noise: Option<&NoiseFile>,
+    ) -> Result<Prepared> {
+        let prepared = with_noise(open(self.still.search())?, noise)?;
+        self.whole.apply(self.keep.apply(prepared))
+    }
 }
 
 /// What to do about readings that no calibration describes.
@@ -82,10 +97,10 @@ pub fn run(args: &DiagnoseArgs, command_line: &str) -> Result<Status> {
         args.json.file(),
     ];
     let inputs = [args.noise.file.as_deref(), args.calibration.as_deref()];
+    let noise = args.noise.read()?;
     let open = |path: &PathBuf| {
-        let prepared = read(path, &args.log, args.still.search(), &outputs, &inputs)?;
-        args.whole
-            .apply(args.keep.apply(args.noise.apply(prepared)?))
+        let read = |search| read(path, &args.log, search, &outputs, &inputs);
+        args.opened(&read, noise.as_ref())
     };
     let given = args.calibration.as_deref().map(Calibration::read);
     let given = given.transpose()?;

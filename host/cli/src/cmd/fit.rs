@@ -16,6 +16,7 @@ use mimu::result::fit::{DwellResult, FitResult};
 use mimu::result::sessions::SessionsResult;
 use mimu::sessions::class::PartClass;
 use mimu::sessions::{Sessions, fit_determined};
+use mimu::signal::stillness::DwellSearch;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::stage;
 use mimu_recording::{Reference, ReferenceError};
@@ -23,10 +24,10 @@ use serde::Serialize;
 
 use crate::arguments::{
     JsonArgs, KeepArgs, NoiseArgs, PartArgs, SensorArg, StillArgs, StrictArgs, VerboseArgs,
-    WholeTurnArgs, WritingArgs,
+    WholeTurnArgs, WritingArgs, with_noise,
 };
 use crate::output::{now, print};
-use crate::reading::{LogArgs, read_samples_or_means};
+use crate::reading::{LogArgs, OF_A_LOG, read_samples_or_means};
 use crate::report;
 use crate::report::budget::budget_text;
 use crate::report::data_sheet::{WithDataSheet, data_sheet_text};
@@ -58,8 +59,6 @@ pub(crate) struct FitArgs {
     #[arg(long, value_name = "FILE")]
     reference_error: Option<PathBuf>,
     #[command(flatten)]
-    log: LogArgs,
-    #[command(flatten)]
     still: StillArgs,
     #[command(flatten)]
     keep: KeepArgs,
@@ -88,6 +87,8 @@ pub(crate) struct FitArgs {
     verbose: VerboseArgs,
     #[command(flatten)]
     json: JsonArgs,
+    #[command(flatten, next_help_heading = OF_A_LOG)]
+    log: LogArgs,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -149,16 +150,120 @@ pub(crate) fn run(args: &FitArgs) -> Result<Status> {
     }
 }
 
-fn options(args: &FitArgs) -> Options {
-    Options {
-        method: match args.method {
-            None | Some(MethodArg::LeastSquares) => Method::LeastSquares,
-            Some(MethodArg::Kalman) => Method::Kalman,
-            Some(MethodArg::InverseForm) => Method::InverseForm,
-            Some(MethodArg::SixPositions) => Method::SixPositions,
-        },
-        holdout_blocks: args.holdout,
-        only: args.only.map(SensorArg::sensor),
+impl FitArgs {
+    fn options(&self) -> Options {
+        Options {
+            method: match self.method {
+                None | Some(MethodArg::LeastSquares) => Method::LeastSquares,
+                Some(MethodArg::Kalman) => Method::Kalman,
+                Some(MethodArg::InverseForm) => Method::InverseForm,
+                Some(MethodArg::SixPositions) => Method::SixPositions,
+            },
+            holdout_blocks: self.holdout,
+            only: self.only.map(SensorArg::sensor),
+        }
+    }
+
+    fn class(&self) -> PartClass {
+        match self.class {
+            None | Some(ClassArg::Consumer) => PartClass::Consumer,
+            Some(ClassArg::Tactical) => PartClass::Tactical,
+        }
+    }
+
+    /// `prepared`, with all that the arguments state.
+    fn complete(&self, prepared: Prepared, noise: Option<&NoiseFile>) -> Result<Prepared> {
+        let prepared = self.keep.apply(with_noise(prepared, noise)?);
+        let prepared = self.whole.apply(prepared)?;
+        let prepared = match &self.reference_error {
+            Some(file) => prepared.with_reference_error(ReferenceError::read(file)?),
+            None => prepared,
+        };
+        let prior = self.prior.as_deref().map(Prior::read).transpose()?;
+        let prepared = match prior {
+            Some(prior) => prepared.with_prior(Arc::new(prior))?,
+            None => prepared,
+        };
+        if self.method.is_some() && prepared.manifest.reference != Reference::Table {
+            return Err(Error::new(
+                &prepared.place,
+                format!(
+                    "--method chooses between estimators for known inputs, and reference is \"{}\"",
+                    prepared.manifest.reference
+                ),
+                "leave --method out, or give the dwells their inputs (reference = \"table\")",
+            ));
+        }
+        Ok(prepared)
+    }
+
+    /// The fit of the recording that `open` reads, without the list of dwells after a refusal.
+    pub(crate) fn fitted(&self, open: &Open, noise: Option<&NoiseFile>) -> Result<FitMade> {
+        self.part.part()?;
+        let prepared = self.complete(open(self.still.search())?, noise)?;
+        let fit = fit_or_faces(prepared, self.options())?;
+        let calibration = Calibration::of(&fit, &[], &now())?;
+        let sheet = self
+            .part
+            .part()?
+            .map(|part| DataSheet::of(&calibration, noise, &part));
+        let result = FitResult::of(&fit);
+        Ok(FitMade {
+            fit,
+            result,
+            calibration,
+            sheet,
+        })
+    }
+
+    /// One calibration of the sessions that `open` reads.
+    pub(crate) fn combined(
+        &self,
+        open: &[Box<Open>],
+        noise: Option<&NoiseFile>,
+    ) -> Result<(SessionsResult, Calibration)> {
+        let fitted = |open: &Open| {
+            let prepared = self.complete(open(self.still.search())?, noise)?;
+            fit_determined(prepared, self.options())
+        };
+        let fits: Result<Vec<Fit>> = open.iter().map(|open| fitted(open.as_ref())).collect();
+        let sessions = Sessions::combine(fits?, self.class())?;
+        let combined = Calibration::of_sessions(&sessions, &now())?;
+        Ok((
+            SessionsResult::of(&sessions, &combined),
+            combined.calibration,
+        ))
+    }
+}
+
+/// Reads a recording, with its dwells found as an argument says.
+pub type Open = dyn Fn(DwellSearch) -> Result<Prepared> + Send;
+
+/// A fit, and what the command prints of it.
+pub struct FitMade {
+    /// The fit.
+    pub fit: Fit,
+    /// Its result.
+    pub result: FitResult,
+    /// The calibration that it gives.
+    pub calibration: Calibration,
+    sheet: Option<DataSheet>,
+}
+
+impl FitMade {
+    /// Its result as JSON.
+    pub fn json(&self) -> impl Serialize {
+        WithDataSheet {
+            result: &self.result,
+            data_sheet: self.sheet.as_ref(),
+        }
+    }
+
+    /// What the command prints.
+    pub fn text(&self) -> String {
+        let mut text = report::fit_text(&self.result, false) + &budget_text(&self.result);
+        text.extend(self.sheet.as_ref().map(data_sheet_text));
+        text
     }
 }
 
@@ -169,28 +274,7 @@ fn prepared(args: &FitArgs, recording: &Path) -> Result<Prepared> {
     let search = args.still.search();
     let prepared = read_samples_or_means(recording, &args.log, search, &outputs, &inputs)?;
     args.writing.check(args.output.as_deref())?;
-    let prepared = args.keep.apply(args.noise.apply(prepared)?);
-    let prepared = args.whole.apply(prepared)?;
-    let prepared = match &args.reference_error {
-        Some(file) => prepared.with_reference_error(ReferenceError::read(file)?),
-        None => prepared,
-    };
-    let prior = args.prior.as_deref().map(Prior::read).transpose()?;
-    let prepared = match prior {
-        Some(prior) => prepared.with_prior(Arc::new(prior))?,
-        None => prepared,
-    };
-    if args.method.is_some() && prepared.manifest.reference != Reference::Table {
-        return Err(Error::new(
-            recording.display(),
-            format!(
-                "--method chooses between estimators for known inputs, and reference is \"{}\"",
-                prepared.manifest.reference
-            ),
-            "leave --method out, or give the dwells their inputs (reference = \"table\")",
-        ));
-    }
-    Ok(prepared)
+    args.complete(prepared, args.noise.read()?.as_ref())
 }
 
 /// Fits a recording. After a refusal the user first needs the list of dwells; the error line comes last.
@@ -201,7 +285,7 @@ fn fitted(
 ) -> Result<Fit> {
     let found = DwellResult::list(&prepared);
     let problems = OfRecording::prepared(&prepared);
-    by(prepared, options(args)).inspect_err(|_| {
+    by(prepared, args.options()).inspect_err(|_| {
         refused(&problems, false);
         eprint!("{}", report::dwell_table(&found));
     })
@@ -235,11 +319,7 @@ fn several(args: &FitArgs) -> Result<Status> {
         .iter()
         .map(|recording| fitted(args, prepared(args, recording)?, fit_determined))
         .collect();
-    let class = match args.class {
-        None | Some(ClassArg::Consumer) => PartClass::Consumer,
-        Some(ClassArg::Tactical) => PartClass::Tactical,
-    };
-    let sessions = Sessions::combine(fits?, class)?;
+    let sessions = Sessions::combine(fits?, args.class())?;
     let combined = Calibration::of_sessions(&sessions, &now())?;
     let result = SessionsResult::of(&sessions, &combined);
     let mut text = report::sessions_text(&result, args.verbose.verbose);
@@ -259,12 +339,7 @@ fn data_sheet(args: &FitArgs, made: impl Fn() -> Result<Calibration>) -> Result<
     let Some(part) = args.part.part()? else {
         return Ok(None);
     };
-    let noise = args
-        .noise
-        .file
-        .as_deref()
-        .map(NoiseFile::read)
-        .transpose()?;
+    let noise = args.noise.read()?;
     Ok(Some(DataSheet::of(&made()?, noise.as_ref(), &part)))
 }
 

@@ -4,18 +4,18 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use mimu::calibration::Calibration;
-use mimu::in_use::{Against, Trajectory, noise_in_use};
+use mimu::in_use::{Against, NoiseInUse, Trajectory, noise_in_use};
 use mimu::noise::noise_file::NoiseFile;
 use mimu::prepared::Prepared;
 use mimu_export::worst_axis::{NoiseOptions, WalkOptions};
 use mimu_export::{Format, Sources, driver, kalibr};
-use mimu_recording::MANIFEST_FILE;
 use mimu_recording::error::Result;
 use mimu_recording::result_file::stage;
+use mimu_recording::{MANIFEST_FILE, Recording};
 
 use crate::arguments::{JsonArgs, StillArgs, StrictArgs};
 use crate::output::{check_outputs, print, progress};
-use crate::reading::{LogArgs, open};
+use crate::reading::{LogArgs, OF_A_LOG, open};
 use crate::report;
 use crate::status::Status;
 
@@ -48,13 +48,13 @@ pub(crate) struct NoiseInUseArgs {
     #[arg(short, value_name = "FILE")]
     output: Option<PathBuf>,
     #[command(flatten)]
-    log: LogArgs,
-    #[command(flatten)]
     still: StillArgs,
     #[command(flatten)]
     strict: StrictArgs,
     #[command(flatten)]
     json: JsonArgs,
+    #[command(flatten, next_help_heading = OF_A_LOG)]
+    log: LogArgs,
 }
 
 pub(crate) fn run(args: &NoiseInUseArgs) -> Result<Status> {
@@ -73,19 +73,7 @@ pub(crate) fn run(args: &NoiseInUseArgs) -> Result<Status> {
     inputs.extend(args.trajectory.as_deref());
     check_outputs(&[args.output.as_deref(), args.json.file()], &inputs)?;
     let bar = progress("dead reckoning");
-    let result = match &args.trajectory {
-        Some(path) => {
-            let trajectory = Trajectory::read(path)?.counted_from(args.trajectory_zero);
-            let against = Against::Trajectory(&trajectory);
-            noise_in_use(&recording, &calibration, &noise, against, |s| bar.reach(s))
-        }
-        None => {
-            let prepared = Prepared::read(&recording, args.still.search(), |s| bar.reach(0.3 * s))?;
-            let against = Against::Rests(&prepared);
-            let reach = |s: f64| bar.reach(0.3 + 0.7 * s);
-            noise_in_use(&recording, &calibration, &noise, against, reach)
-        }
-    };
+    let result = args.found(&recording, &calibration, &noise, &|share| bar.reach(share));
     bar.finish();
     let result = result?;
     let mut text = report::noise_in_use_text(&result);
@@ -100,6 +88,32 @@ pub(crate) fn run(args: &NoiseInUseArgs) -> Result<Status> {
     }
     print(&args.json, &text, &result, staged)?;
     Ok(args.strict.status(&result.judgement))
+}
+
+impl NoiseInUseArgs {
+    /// The noise that the recording shows.
+    pub(crate) fn found(
+        &self,
+        recording: &Recording,
+        calibration: &Calibration,
+        noise: &NoiseFile,
+        reach: &dyn Fn(f64),
+    ) -> Result<NoiseInUse> {
+        match &self.trajectory {
+            Some(path) => {
+                let trajectory = Trajectory::read(path)?.counted_from(self.trajectory_zero);
+                let against = Against::Trajectory(&trajectory);
+                noise_in_use(recording, calibration, noise, against, reach)
+            }
+            None => {
+                let prepared = Prepared::read(recording, self.still.search(), |s| reach(0.3 * s))?;
+                let against = Against::Rests(&prepared);
+                noise_in_use(recording, calibration, noise, against, |s| {
+                    reach(0.3 + 0.7 * s)
+                })
+            }
+        }
+    }
 }
 
 /// Kalibr's file, as `mimu export kalibr` writes it.

@@ -10,15 +10,14 @@ use mimu::calibration::verify::{Verification, WholeTurnsOfAxis, verify};
 use mimu::data_sheet::DataSheet;
 use mimu::diagnose::Recordings;
 use mimu::diagnosed::{Diagnosed, diagnosed};
-use mimu::noise::noise_file::NoiseFile;
 use mimu::prepared::Prepared;
 use mimu::recording_problem::OfRecording;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::stage;
 
-use crate::arguments::{KeepArgs, NoiseArgs, PartArgs, StillArgs, WholeTurnArgs};
+use crate::arguments::{KeepArgs, NoiseArgs, PartArgs, StillArgs, WholeTurnArgs, with_noise};
 use crate::output::{now, progress, show};
-use crate::reading::{LogArgs, read};
+use crate::reading::{LogArgs, OF_A_LOG, read};
 use crate::report::refused;
 use crate::report::text::problems;
 use crate::report::{Made, UnitReport, unit_page};
@@ -40,8 +39,6 @@ pub struct ReportArgs {
     #[arg(short = 'o', long = "out", value_name = "FILE")]
     out: PathBuf,
     #[command(flatten)]
-    log: LogArgs,
-    #[command(flatten)]
     still: StillArgs,
     #[command(flatten)]
     keep: KeepArgs,
@@ -53,6 +50,8 @@ pub struct ReportArgs {
     whole: WholeTurnArgs,
     #[command(flatten)]
     certificate: CertificateArgs,
+    #[command(flatten, next_help_heading = OF_A_LOG)]
+    log: LogArgs,
 }
 
 /// Sources of a page.
@@ -99,19 +98,14 @@ pub fn run(args: &ReportArgs, command_line: &str) -> Result<()> {
     let outputs = [Some(args.out.as_path())];
     let mut others = vec![args.noise.file.as_deref(), inputs.calibration.as_deref()];
     others.extend(args.certificate.inputs());
+    let noise = args.noise.read()?;
     let open = |path: &PathBuf| -> Result<(String, Prepared)> {
         let prepared = read(path, &args.log, args.still.search(), &outputs, &others)?;
-        let prepared = args.whole.apply(args.noise.apply(prepared)?)?;
+        let prepared = args.whole.apply(with_noise(prepared, noise.as_ref())?)?;
         let prepared = args.keep.apply(prepared);
         Ok((path.display().to_string(), prepared))
     };
     let recordings: Vec<_> = inputs.recordings.iter().map(open).collect::<Result<_>>()?;
-    let noise = args
-        .noise
-        .file
-        .as_deref()
-        .map(NoiseFile::read)
-        .transpose()?;
     if let Some(particulars) = &args.certificate.particulars {
         let given = Given {
             recording: the_only(recordings)?,

@@ -18,9 +18,11 @@ use mimu_thermal::fit::{Estimator, Options, fit};
 use mimu_thermal::result::ThermalResult;
 use mimu_thermal::session::Session;
 
-use crate::arguments::{JsonArgs, NoiseArgs, StillArgs, StrictArgs, VerboseArgs, WritingArgs};
+use crate::arguments::{
+    JsonArgs, NoiseArgs, StillArgs, StrictArgs, VerboseArgs, WritingArgs, with_noise,
+};
 use crate::output::{check_outputs, now, print};
-use crate::reading::{LogArgs, read};
+use crate::reading::{LogArgs, OF_A_LOG, read};
 use crate::report::{self, Made, thermal_plot};
 use crate::status::Status;
 
@@ -33,7 +35,7 @@ pub(crate) struct ThermalArgs {
 #[derive(Subcommand)]
 enum ThermalCommand {
     /// Estimate all parameters over temperature, and the lag of the dies behind the thermometer
-    Fit(FitArgs),
+    Fit(Box<FitArgs>),
     /// Compare two calibrations over temperature, curve by curve
     Compare(CompareArgs),
     /// Plan a procedure; prints its duration and the expected uncertainty of the curves
@@ -44,7 +46,7 @@ enum ThermalCommand {
 }
 
 #[derive(Args)]
-struct FitArgs {
+pub(crate) struct FitArgs {
     /// Directories of the recordings of one unit, one for each power-on
     #[arg(required = true)]
     recordings: Vec<PathBuf>,
@@ -64,8 +66,6 @@ struct FitArgs {
     /// for `mimu export px4` and `ardupilot`
     #[arg(long, value_name = "FILE")]
     base: Option<PathBuf>,
-    #[command(flatten)]
-    log: LogArgs,
     #[command(flatten)]
     noise: NoiseArgs,
     #[command(flatten)]
@@ -90,6 +90,28 @@ struct FitArgs {
     verbose: VerboseArgs,
     #[command(flatten)]
     json: JsonArgs,
+    #[command(flatten, next_help_heading = OF_A_LOG)]
+    log: LogArgs,
+}
+
+impl FitArgs {
+    /// How the dwells are found.
+    pub(crate) fn search(&self) -> DwellSearch {
+        let mut search = self.still.search();
+        if self.at_rest {
+            search.steps = Steps::AtRest;
+        }
+        search
+    }
+
+    /// How the curves are estimated.
+    pub(crate) fn options(&self) -> Options {
+        Options {
+            estimator: self.estimator.estimator(),
+            lag_s: self.lag,
+            range_c: self.range,
+        }
+    }
 }
 
 #[derive(Args)]
@@ -180,26 +202,17 @@ fn run_fit(args: &FitArgs, command_line: &str) -> Result<Status> {
     ];
     let beside = [args.base.as_deref(), args.noise.file.as_deref()];
     let base = args.base.as_deref().map(Calibration::read).transpose()?;
+    let noise = args.noise.read()?;
     let session = |directory: &PathBuf, search: DwellSearch| {
         let prepared = read(directory, &args.log, search, &outputs, &beside)?;
-        Session::of(&args.noise.apply(prepared)?)
+        Session::of(&with_noise(prepared, noise.as_ref())?)
     };
     let all = |list: &[PathBuf]| -> Result<Vec<Session>> {
-        let each = list.iter();
-        let mut search = args.still.search();
-        if args.at_rest {
-            search.steps = Steps::AtRest;
-        }
-        each.map(|d| session(d, search)).collect()
+        list.iter().map(|d| session(d, args.search())).collect()
     };
     let (sessions, verify) = (all(&args.recordings)?, all(&args.verify)?);
     args.writing.check(args.output.as_deref())?;
-    let options = Options {
-        estimator: args.estimator.estimator(),
-        lag_s: args.lag,
-        range_c: args.range,
-    };
-    let fitted = fit(sessions, &verify, options)?;
+    let fitted = fit(sessions, &verify, args.options())?;
     let result = ThermalResult::of(&fitted);
     let mut text = report::thermal_text(&result, args.verbose.verbose);
     let mut staged = Vec::new();

@@ -4,16 +4,19 @@ use std::path::PathBuf;
 
 use clap::Args;
 use mimu::calibration::Calibration;
-use mimu::calibration::verify::verify;
+use mimu::calibration::verify::{Verification, verify};
 use mimu::data_sheet::DataSheet;
 use mimu::noise::noise_file::NoiseFile;
+use mimu::prepared::Prepared;
+use mimu::signal::stillness::DwellSearch;
 use mimu_recording::error::Result;
+use serde::Serialize;
 
 use crate::arguments::{
-    JsonArgs, NoiseArgs, PartArgs, StillArgs, StrictArgs, VerboseArgs, WholeTurnArgs,
+    JsonArgs, NoiseArgs, PartArgs, StillArgs, StrictArgs, VerboseArgs, WholeTurnArgs, with_noise,
 };
 use crate::output::print;
-use crate::reading::{LogArgs, read_samples_or_means};
+use crate::reading::{LogArgs, OF_A_LOG, read_samples_or_means};
 use crate::report;
 use crate::report::data_sheet::{WithDataSheet, data_sheet_text};
 use crate::status::Status;
@@ -25,8 +28,6 @@ pub(crate) struct VerifyArgs {
     /// Calibration file
     #[arg(long, value_name = "FILE")]
     calibration: PathBuf,
-    #[command(flatten)]
-    log: LogArgs,
     #[command(flatten)]
     still: StillArgs,
     #[command(flatten)]
@@ -41,35 +42,64 @@ pub(crate) struct VerifyArgs {
     verbose: VerboseArgs,
     #[command(flatten)]
     json: JsonArgs,
+    #[command(flatten, next_help_heading = OF_A_LOG)]
+    log: LogArgs,
 }
 
 pub(crate) fn run(args: &VerifyArgs) -> Result<Status> {
     let calibration = Calibration::read(&args.calibration)?;
-    let part = args.part.part()?;
     let outputs = [args.json.file()];
     let log = args.log.or_gravity(calibration.recording.gravity_mps2);
-    let prepared = read_samples_or_means(
-        &args.recording,
-        &log,
-        args.still.search(),
-        &outputs,
-        &[Some(&args.calibration), args.noise.file.as_deref()],
+    let inputs = [Some(args.calibration.as_path()), args.noise.file.as_deref()];
+    let open = |search| read_samples_or_means(&args.recording, &log, search, &outputs, &inputs);
+    let noise = args.noise.read()?;
+    let made = args.judged(&open, noise.as_ref(), &calibration)?;
+    print(
+        &args.json,
+        &made.text(args.verbose.verbose),
+        &made.json(),
+        None,
     )?;
-    let prepared = args.whole.apply(args.noise.apply(prepared)?)?;
-    let result = verify(&prepared, &calibration)?;
-    let noise = args
-        .noise
-        .file
-        .as_deref()
-        .map(NoiseFile::read)
-        .transpose()?;
-    let sheet = part.map(|part| DataSheet::of(&calibration, noise.as_ref(), &part));
-    let mut text = report::verify_text(&result, args.verbose.verbose);
-    text.extend(sheet.as_ref().map(data_sheet_text));
-    let both = WithDataSheet {
-        result: &result,
-        data_sheet: sheet.as_ref(),
-    };
-    print(&args.json, &text, &both, None)?;
-    Ok(args.strict.status(&result.judgement))
+    Ok(args.strict.status(&made.result.judgement))
+}
+
+impl VerifyArgs {
+    /// `calibration` judged by the recording that `open` reads.
+    pub(crate) fn judged(
+        &self,
+        open: &dyn Fn(DwellSearch) -> Result<Prepared>,
+        noise: Option<&NoiseFile>,
+        calibration: &Calibration,
+    ) -> Result<Verified> {
+        let part = self.part.part()?;
+        let prepared = with_noise(open(self.still.search())?, noise)?;
+        Ok(Verified {
+            result: verify(&self.whole.apply(prepared)?, calibration)?,
+            sheet: part.map(|part| DataSheet::of(calibration, noise, &part)),
+        })
+    }
+}
+
+/// A verification, and what the command prints of it.
+pub struct Verified {
+    /// The verification.
+    pub result: Verification,
+    sheet: Option<DataSheet>,
+}
+
+impl Verified {
+    /// Its result as JSON.
+    pub fn json(&self) -> impl Serialize {
+        WithDataSheet {
+            result: &self.result,
+            data_sheet: self.sheet.as_ref(),
+        }
+    }
+
+    /// What the command prints.
+    pub fn text(&self, verbose: bool) -> String {
+        let mut text = report::verify_text(&self.result, verbose);
+        text.extend(self.sheet.as_ref().map(data_sheet_text));
+        text
+    }
 }

@@ -14,7 +14,7 @@ use mimu::result::sessions::SessionsResult;
 use mimu_recording::error::Result;
 use mimu_thermal::result::ThermalResult;
 
-use super::page::{Made, STYLE};
+use super::page::{Made, STYLE, judged};
 use super::{allan_plot, diagnosis, fit, noise_in_use, sessions_text, thermal_page, unit, verify};
 use crate::hint;
 use crate::output::now;
@@ -24,6 +24,7 @@ pub fn of_fit(fit: &Fit, result: &FitResult, calibration: &Calibration) -> Strin
     let prepared = &fit.prepared;
     fragment(&html! {
         h1 { "Calibration of " (result.device) }
+        (judged(&result.judgement))
         (fit::errors(result).html())
         (unit::model::section(calibration))
         (unit::poses::figure(prepared, calibration, None))
@@ -47,6 +48,7 @@ pub fn of_diagnosis(result: &DiagnosisResult, made: &Made) -> Result<String> {
 pub fn of_allan(result: &AllanResult) -> String {
     fragment(&html! {
         h1 { "Noise of " (result.device.as_deref().unwrap_or("a unit")) }
+        @if let Some(judgement) = &result.judgement { (judged(judgement)) }
         @if let Some(noise) = result.noise_file(&now()) { (unit::noise::section(&noise)) }
         // As an image: otherwise the drawing's style would apply to the whole page.
         @if result.recordings.len() == 1 {
@@ -60,7 +62,7 @@ pub fn of_allan(result: &AllanResult) -> String {
 pub fn of_noise_in_use(result: &NoiseInUse) -> String {
     fragment(&html! {
         h1 { "Noise in use of " (result.device) }
-        p { (result.judgement.to_string()) }
+        (judged(&result.judgement))
         @for table in noise_in_use::tables(result) { (table.html()) }
         @for sentence in &result.sentences { p { (sentence) } }
         @if !result.warnings.is_empty() { ul { @for warning in &result.warnings { li { (warning.to_string()) } } } }
@@ -86,6 +88,7 @@ pub fn of_text(text: &str) -> String {
 pub fn of_verification(name: &str, verification: &Verification) -> String {
     let one = [(name.to_owned(), verification.clone())];
     fragment(&html! {
+        (judged(&verification.judgement))
         (verify::errors(&one, true).html())
         @if !verification.warnings.is_empty() {
             ul { @for warning in &verification.warnings { li { (warning.to_string()) } } }
@@ -117,9 +120,22 @@ pub fn of_terms(title: &str, terms: &[(&str, String)]) -> String {
 fn fragment(main: &Markup) -> String {
     // A nested style sheet applies to the element of the outer rule and its contents. This element takes the place of the page's root and body.
     let style = STYLE.replace(":root{", "&{").replace("\nbody{", "\n&{");
+    // A notebook's theme colours text and rows, whatever the system prefers.
+    let palettes: Vec<&str> = STYLE
+        .split(":root{")
+        .skip(1)
+        .filter_map(|s| s.split('}').next())
+        .collect();
+    let themes = [
+        r#"body[data-jp-theme-light="true"] &,.vscode-light &"#,
+        r#"body[data-jp-theme-light="false"] &,.vscode-dark &"#,
+    ];
+    let themes: String = std::iter::zip(themes, palettes)
+        .map(|(theme, palette)| format!("{theme}{{{palette}}}"))
+        .collect();
     let all = html! {
         div class="mimu" {
-            style { (PreEscaped(format!(".mimu{{{style}\npadding:1rem 1.5rem}}"))) }
+            style { (PreEscaped(format!(".mimu{{{style}\n{themes}padding:1rem 1.5rem}}"))) }
             (main)
         }
     };
@@ -154,6 +170,10 @@ mod tests {
             !style.contains(":root") && !style.contains("body{"),
             "{style}"
         );
+        let dark = STYLE.split("scheme:dark){:root{").nth(1).unwrap();
+        let dark = dark.split('}').next().unwrap();
+        let theme = format!("body[data-jp-theme-light=\"false\"] &,.vscode-dark &{{{dark}}}");
+        assert!(style.contains(&theme), "{style}");
         let open = style.matches('{').count();
         assert_eq!(open, style.matches('}').count());
         // The outermost rule ends at the last brace.

@@ -296,6 +296,37 @@ fn messages_about_a_log_name_the_log() {
 }
 
 #[test]
+fn a_command_takes_the_options_of_the_import_for_a_log() {
+    let folder = log();
+    let at = folder.path();
+    let text = std::fs::read_to_string(at.join("log.csv")).unwrap();
+    let mut rows: Vec<&str> = text.lines().collect();
+    let broken = rows[2000].replacen(',', ",?", 1);
+    rows[2000] = &broken;
+    std::fs::write(at.join("broken.csv"), rows.join("\n")).unwrap();
+    let error = refused(at, "fit broken.csv --units m/s2,rad/s");
+    assert!(error.ends_with("(--skip-broken)"), "{error}");
+    let options = "broken.csv --units m/s2,rad/s --skip-broken=1 --rows ..6000 --device lab";
+    right(at, &format!("import {options} --gravity 9.8 -o lab"));
+    let of_log = json(&right(at, &format!("fit {options} --gravity 9.8 --json -")));
+    let of_recording = json(&right(at, "fit lab --json -"));
+    assert_eq!(of_log["sensors"], of_recording["sensors"]);
+    assert_eq!(of_log["device"], "lab");
+    // The command to complete is the one that was typed. A recording is put right by another import.
+    let nameless: Vec<&str> = rows[1..300].to_vec();
+    std::fs::write(
+        at.join("names.csv"),
+        format!("t,a,b,c,d,e,f\n{}", nameless.join("\n")),
+    )
+    .unwrap();
+    let error = refused(at, "allan names.csv -o n.toml");
+    assert!(
+        error.contains("say it: mimu allan names.csv -o n.toml --"),
+        "{error}"
+    );
+}
+
+#[test]
 fn a_suspicion_about_readings_names_the_option_that_trusts_them() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
