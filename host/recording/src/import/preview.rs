@@ -31,6 +31,9 @@ pub struct Preview {
     pub names: Vec<String>,
     /// Units in a line of their own below the names; empty if there is none.
     pub units: Vec<String>,
+    /// Samples a second, if a line above the rows says it: `// Sample rate: 50.0Hz`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rate_hz: Option<f64>,
     /// The separator, if it is one that an import does not recognise: labels among the numbers.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub separator: Option<Separator>,
@@ -141,18 +144,23 @@ fn of_lines(lines: &[&[u8]], separator: Option<Separator>, most: usize) -> Optio
         !comment(line) && row.len() > 1 && 2 * numbers(&row) > row.len()
     };
     let first = lines.iter().position(is_row)?;
-    let width = cells(lines[first]).len();
+    let row = cells(lines[first]);
+    // A separator may end the rows and not the names.
+    let ends = row.last().is_some_and(|last| last.trim().is_empty());
+    let is_header = |names: &Vec<String>| {
+        numbers(names) == 0 && (names.len() == row.len() || ends && names.len() + 1 == row.len())
+    };
     let above = lines[..first]
         .iter()
         .rev()
         .map(|line| cells(signs.skipped(line)));
-    let mut headers = above.filter(|row| row.len() == width && numbers(row) == 0);
+    let mut headers = above.filter(is_header);
     let nearest = headers.next().unwrap_or_default();
     let (mut names, units) = match headers.next() {
         Some(names) if is_units(&nearest) => (names, nearest),
         _ => (nearest, Vec::new()),
     };
-    let fixed = fixed_fields(&cells(lines[first]));
+    let fixed = fixed_fields(&row);
     let known = fixed.is_some();
     if let Some(fields) = fixed {
         names = fields.split(',').map(str::to_owned).collect();
@@ -161,6 +169,7 @@ fn of_lines(lines: &[&[u8]], separator: Option<Separator>, most: usize) -> Optio
     Some(Preview {
         names,
         units,
+        rate_hz: lines[..first].iter().find_map(|line| stated_rate(line)),
         rows: rows.take(most).map(|line| cells(line)).collect(),
         separator: known.then_some(separator),
         ..Preview::default()
@@ -205,7 +214,16 @@ fn fixed_fields(row: &[String]) -> Option<&'static str> {
         .or(echo.then_some(ROS2_ECHO))
 }
 
-/// Whether a line of words is one of units, below the names: short words, or brackets.
+/// Samples a second that a line says, behind the word rate: `data_rate = 2000.0 Hz`.
+fn stated_rate(line: &[u8]) -> Option<f64> {
+    let line = String::from_utf8_lossy(line).to_lowercase();
+    let (_, behind) = line.split_once("rate")?;
+    let (number, _) = behind.split_once("hz")?;
+    let number = number.trim_start_matches(|c: char| !c.is_ascii_digit());
+    number.trim_end().parse().ok()
+}
+
+/// Whether a line of words is one of units, below the names: brackets and short words, some of which may be unknown.
 fn is_units(row: &[String]) -> bool {
     let unit = |cell: &&String| {
         let cell = cell.trim();
@@ -213,9 +231,8 @@ fn is_units(row: &[String]) -> bool {
         bracketed || UNITS.contains(&cell) || ["-", ""].contains(&cell)
     };
     let filled = row.iter().filter(|cell| !cell.trim().is_empty());
-    filled.clone().count() > 0
-        && row.iter().all(|cell| unit(&cell))
-        && filled.count() * 2 >= row.len()
+    let known = filled.clone().filter(unit).count();
+    known > 0 && 2 * known >= filled.clone().count() && filled.count() * 2 >= row.len()
 }
 
 /// Lines of labels, the same in all samples, and numbers.
@@ -264,6 +281,23 @@ mod tests {
         assert_eq!(preview.rows, [["0,01", "2", "3"], ["0,02", "4", "5"]]);
         assert_eq!(of("# t wx ax\n0 1 2\n1 1 2\n").names, ["t", "wx", "ax"]);
         assert!(of("1\t2\n3\t4\n").names.is_empty());
+    }
+
+    #[test]
+    fn units_below_the_names_may_be_unknown_and_a_line_may_say_the_rate() {
+        // As Consensys and an older Xsens program write them.
+        let table = of(
+            "\"sep=;\"\nTime;LN_X;GSR;Gyro_X;Mag\nms;m/(s^2);kOhms;deg/s;local_flux;\n1.5;9.8;401.1;0.1;2;\n2;9.8;401;0.2;2;\n",
+        );
+        assert_eq!(table.names[..2], ["Time", "LN_X"]);
+        assert_eq!(table.units[..4], ["ms", "m/(s^2)", "kOhms", "deg/s"]);
+        let table =
+            of("// Sample rate: 50.0Hz\nCounter\tAcc_X\tGyr_X\n 1\t4.3\t0.1\t\n 2\t4.4\t0.1\t\n");
+        assert_eq!(table.names, ["Counter", "Acc_X", "Gyr_X"]);
+        assert_eq!(table.rate_hz, Some(50.0));
+        for no_rate in ["# rate 1 kHz", "rate,Hz", "# range = 4 g, 50 Hz"] {
+            assert_eq!(stated_rate(no_rate.as_bytes()), None, "{no_rate}");
+        }
     }
 
     #[test]

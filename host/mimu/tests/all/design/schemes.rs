@@ -201,7 +201,10 @@ fn products_cannot_be_told_apart_by_the_size_of_gravity() {
 fn niu_and_xu_positions_are_as_published() {
     let xu = Scheme::Xu33.settings(Sensor::Accel).unwrap();
     // Appendix, F_x(1) to F_z(11) in units of g: rows 2 to 5 with the first angles, rows 7 to 10 with the second.
-    let (s, c) = (|deg: f64| deg.to_radians().sin(), |deg: f64| deg.to_radians().cos());
+    let (s, c) = (
+        |deg: f64| deg.to_radians().sin(),
+        |deg: f64| deg.to_radians().cos(),
+    );
     let angles = [[15.0, 30.0, 45.0, 60.0], [30.0, 45.0, 60.0, 75.0]];
     let published = [
         vec![[-1.0, 0.0, 0.0]],

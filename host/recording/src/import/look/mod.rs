@@ -48,6 +48,8 @@ pub struct FileLook {
     pub names: Vec<String>,
     /// What the columns are.
     pub guess: Guess,
+    /// Samples a second, if a line above the rows says it.
+    pub rate_hz: Option<f64>,
     /// The separator, if an import would not recognise it.
     pub separator: Option<Separator>,
 }
@@ -240,6 +242,7 @@ impl Look {
                 path: path.clone(),
                 names: seen.names,
                 guess,
+                rate_hz: seen.rate_hz,
                 separator: seen.separator,
             });
             numbers.push(rows);
@@ -400,12 +403,18 @@ impl Look {
                 let known = list.trim_start_matches("--columns ").trim_matches('\'');
                 let answer = match known.contains('=') && self.files.len() == 1 {
                     true => format!("--columns 't_s={name},{known}'"),
-                    false => "--rate-hz RATE".into(),
+                    false => self.rate_answer(),
                 };
                 self.ask(about, &answer);
             }
-            None => self.ask("no column is a time".into(), "--rate-hz RATE"),
+            None => self.ask("no column is a time".into(), &self.rate_answer()),
         }
+    }
+
+    /// The option that gives the rate, with the one that the file says.
+    fn rate_answer(&self) -> String {
+        let stated = self.files.iter().find_map(|look| look.rate_hz);
+        stated.map_or("--rate-hz RATE".into(), |rate| format!("--rate-hz {rate}"))
     }
 
     /// Asks about names that stand for two sensors, and about a triad of an unknown name where one sensor is missing: left out without a word, the fit
@@ -470,7 +479,7 @@ impl Look {
             if let Some(role) = roles.iter_mut().find(|role| **role == "t_s") {
                 *role = "sample";
             }
-            self.ask(about, "--rate-hz RATE");
+            self.ask(about, &self.rate_answer());
         } else if look.guess.grows
             && let Err([fine, coarse]) = Unit::recognise(&Seen::of(&times))
         {
