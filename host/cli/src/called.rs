@@ -34,9 +34,8 @@ use crate::cmd::thermal::FitArgs as ThermalFitArgs;
 pub use crate::cmd::verify::Verified;
 use crate::cmd::verify::VerifyArgs;
 use crate::cmd::wizard::{WizardArgs, session};
-use crate::hint;
+use crate::hint::{self, OF_A_LOG};
 use crate::importing::{ImportArgs, imported};
-use crate::reading::OF_A_LOG;
 
 /// Why a call was refused.
 #[derive(Debug)]

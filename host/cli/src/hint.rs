@@ -1,8 +1,8 @@
 //! Adds the flags of the command line to errors and warnings of the libraries.
 
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicBool, Ordering};
 
-use clap::Args;
+use clap::CommandFactory;
 use mimu::diagnose::rejected::{Reason, Rejected};
 use mimu::warning::Warning;
 use mimu_recording::error::{Argument, Error};
@@ -10,13 +10,20 @@ use mimu_recording::health::Fault;
 use mimu_thermal::warning::Warning as OverTemperature;
 use mimu_wizard::waiting::Waiting;
 
-use crate::importing::LogOptions;
-use crate::reading::{LOG_IS_READ, OF_A_LOG};
+use crate::Cli;
+
+/// Heading, in a help, of the options that say what a log contains.
+pub(crate) const OF_A_LOG: &str = "A log in place of the recording";
+
+/// Whether the command was given a log, so that these options apply.
+pub(crate) static LOG_IS_READ: AtomicBool = AtomicBool::new(false);
 
 /// The error in one line, with the flags of `command` that can remedy it. Several commands can cause the same refusal, and a flag that the present
 /// one lacks is no remedy.
 pub(crate) fn line(error: &Error, command: &clap::Command) -> String {
     let arguments = &error.refused().arguments;
+    let all = Cli::command();
+    let fit = all.find_subcommand("fit");
     let named = |flag: &'static str| {
         // A remedy in another command applies after any command.
         if flag.starts_with("mimu ") {
@@ -28,19 +35,17 @@ pub(crate) fn line(error: &Error, command: &clap::Command) -> String {
             None => a.get_short() == first.chars().nth(1),
         };
         // What is wrong with a recording that was imported before is put right by another import.
-        let import = LogOptions::augment_args(clap::Command::new("import"));
-        let imported = import
-            .get_arguments()
-            .any(|a| is_it(&a))
-            .then(|| format!("mimu import {flag}"));
+        let of_the_import = |a: &clap::Arg| a.get_help_heading() == Some(OF_A_LOG);
+        let mut of_a_fit = fit.iter().flat_map(|fit| fit.get_arguments());
+        let imported = of_a_fit.any(|a| of_the_import(a) && is_it(&a));
+        let imported = imported.then(|| format!("mimu import {flag}"));
         let log = LOG_IS_READ.load(Ordering::Relaxed);
         match command.get_arguments().find(is_it) {
-            Some(a) if log || a.get_help_heading() != Some(OF_A_LOG) => Some(flag.to_string()),
-            Some(_) => imported,
-            None if imported.is_some() => imported,
+            Some(a) if log || !of_the_import(a) => Some(flag.to_string()),
+            _ if imported.is_some() => imported,
             // A diagnosis needs both sensors; only a fit accepts one.
             None if flag == "--only" => Some(format!("mimu fit {flag}")),
-            None => None,
+            _ => None,
         }
     };
     let flags: Vec<String> = arguments

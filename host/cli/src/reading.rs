@@ -1,7 +1,7 @@
 //! Reads the recording of a subcommand.
 
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use std::sync::{Mutex, PoisonError};
 
 use clap::Args;
@@ -11,12 +11,10 @@ use mimu_recording::error::{Error, Result};
 use mimu_recording::{ImportOptions, MANIFEST_FILE, PoseMeans, Recording};
 use tempfile::TempDir;
 
+use crate::hint::LOG_IS_READ;
 use crate::importing::{LogOptions, imported_log};
 use crate::output::{check_outputs, progress};
 use crate::report;
-
-/// Heading of [`LogArgs`] in a help.
-pub(crate) const OF_A_LOG: &str = "A log in place of the recording";
 
 /// What a log that is given in place of a recording does not say, and where its recording is kept.
 #[derive(Args, Default, Clone)]
@@ -38,9 +36,6 @@ impl LogArgs {
         with
     }
 }
-
-/// Whether the command was given a log, so that options of the import apply to it.
-pub(crate) static LOG_IS_READ: AtomicBool = AtomicBool::new(false);
 
 /// Folders of logs that were given in place of recordings; see [`remove_logs`].
 static LOGS: Mutex<Vec<TempDir>> = Mutex::new(Vec::new());

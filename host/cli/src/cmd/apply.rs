@@ -9,8 +9,9 @@ use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{CopiedTable, MANIFEST_FILE, Recording, SampleFormat};
 
 use crate::arguments::JsonArgs;
+use crate::hint::OF_A_LOG;
 use crate::output::{check_outputs, print, progress};
-use crate::reading::{LogArgs, OF_A_LOG, imported_to, named, open};
+use crate::reading::{LogArgs, imported_to, named, open};
 use crate::report;
 
 #[derive(Args)]

@@ -19,8 +19,9 @@ use crate::arguments::{
     JsonArgs, KeepArgs, NoiseArgs, StillArgs, StrictArgs, VerboseArgs, WholeTurnArgs, WritingArgs,
     with_noise,
 };
+use crate::hint::OF_A_LOG;
 use crate::output::{now, print, progress};
-use crate::reading::{LogArgs, OF_A_LOG, read};
+use crate::reading::{LogArgs, read};
 use crate::report::refused;
 use crate::status::Status;
 

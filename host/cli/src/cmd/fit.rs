@@ -26,8 +26,9 @@ use crate::arguments::{
     JsonArgs, KeepArgs, NoiseArgs, PartArgs, SensorArg, StillArgs, StrictArgs, VerboseArgs,
     WholeTurnArgs, WritingArgs, with_noise,
 };
+use crate::hint::OF_A_LOG;
 use crate::output::{now, print};
-use crate::reading::{LogArgs, OF_A_LOG, read_samples_or_means};
+use crate::reading::{LogArgs, read_samples_or_means};
 use crate::report;
 use crate::report::budget::budget_text;
 use crate::report::data_sheet::{WithDataSheet, data_sheet_text};

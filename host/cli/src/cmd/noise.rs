@@ -14,8 +14,9 @@ use mimu_recording::result_file::stage;
 use mimu_recording::{MANIFEST_FILE, Recording};
 
 use crate::arguments::{JsonArgs, StillArgs, StrictArgs};
+use crate::hint::OF_A_LOG;
 use crate::output::{check_outputs, print, progress};
-use crate::reading::{LogArgs, OF_A_LOG, open};
+use crate::reading::{LogArgs, open};
 use crate::report;
 use crate::status::Status;
 

@@ -16,8 +16,9 @@ use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::stage;
 
 use crate::arguments::{KeepArgs, NoiseArgs, PartArgs, StillArgs, WholeTurnArgs, with_noise};
+use crate::hint::OF_A_LOG;
 use crate::output::{now, progress, show};
-use crate::reading::{LogArgs, OF_A_LOG, read};
+use crate::reading::{LogArgs, read};
 use crate::report::refused;
 use crate::report::text::problems;
 use crate::report::{Made, UnitReport, unit_page};

@@ -21,8 +21,9 @@ use mimu_thermal::session::Session;
 use crate::arguments::{
     JsonArgs, NoiseArgs, StillArgs, StrictArgs, VerboseArgs, WritingArgs, with_noise,
 };
+use crate::hint::OF_A_LOG;
 use crate::output::{check_outputs, now, print};
-use crate::reading::{LogArgs, OF_A_LOG, read};
+use crate::reading::{LogArgs, read};
 use crate::report::{self, Made, thermal_plot};
 use crate::status::Status;
 

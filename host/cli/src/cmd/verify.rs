@@ -15,8 +15,9 @@ use serde::Serialize;
 use crate::arguments::{
     JsonArgs, NoiseArgs, PartArgs, StillArgs, StrictArgs, VerboseArgs, WholeTurnArgs, with_noise,
 };
+use crate::hint::OF_A_LOG;
 use crate::output::print;
-use crate::reading::{LogArgs, OF_A_LOG, read_samples_or_means};
+use crate::reading::{LogArgs, read_samples_or_means};
 use crate::report;
 use crate::report::data_sheet::{WithDataSheet, data_sheet_text};
 use crate::status::Status;
