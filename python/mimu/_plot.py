@@ -45,7 +45,7 @@ def deviations(allan: Allan, sensor: str, ax: Any) -> Any:
     """Deviations with their intervals, double logarithmic."""
     channels = [channel for channel in allan.channels if channel.name.startswith(sensor)]
     if not channels:
-        raise Error.of("sensor", f"there is no channel of {sensor}", "give gyro or accel")
+        raise Error.of("sensor", f"the noise lacks channels of the {sensor}", "give gyro or accel")
     ax = _axes(ax)
     for channel in channels:
         (line,) = ax.loglog(channel.tau_s, channel.adev, label=channel.name)

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use mimu::noise::noise_file::NoiseFile;
 use mimu::result::allan::AllanResult;
 use mimu::survey::survey_all;
-use mimu_cli::called;
+use mimu_cli::called::{AllanArgs, of_contents};
 use mimu_cli::report::{self, allan_plot, fragment};
 use mimu_recording::error::{Error, Result};
 use pyo3::prelude::*;
@@ -73,7 +73,7 @@ pub(crate) fn allan(
     let sources = sources(py, &recordings)?;
     let model = calibration.map(|calibration| calibration.model.clone());
     let work = move || {
-        let options = called::allan(arguments)?;
+        let options = of_contents::<AllanArgs>("allan", arguments)?.options()?;
         let samples = sources
             .iter()
             .map(|s| s.samples().map(|s| s.as_ref().clone()));

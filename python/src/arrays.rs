@@ -1,5 +1,6 @@
 //! Arrays of Python: what is taken for readings, and how a recording reads them.
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 use mimu_recording::error::{Argument, Error, Result};
@@ -12,89 +13,53 @@ use pyo3::types::IntoPyDict;
 
 use crate::error::raised;
 
-/// What an array of a recording contains.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Field {
-    Time,
-    Step,
-    Temperature,
-    Gyro,
-    Accel,
-    Rate,
-    Force,
+/// An array of a recording: its keyword, and its columns, one or x, y and z.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Field {
+    pub(crate) name: &'static str,
+    pub(crate) columns: &'static [Column],
 }
 
-impl Field {
-    pub(crate) const ALL: [Self; 7] = [
-        Self::Time,
-        Self::Step,
-        Self::Temperature,
-        Self::Gyro,
-        Self::Accel,
-        Self::Rate,
-        Self::Force,
-    ];
-
-    /// The keyword of [`crate::recording::Recording`].
-    pub(crate) fn name(self) -> &'static str {
-        match self {
-            Self::Time => "t",
-            Self::Step => "step",
-            Self::Temperature => "temp",
-            Self::Gyro => "gyro",
-            Self::Accel => "accel",
-            Self::Rate => "ref_rate_dps",
-            Self::Force => "ref_force_mps2",
-        }
-    }
-
-    /// Its columns: one, or x, y and z.
-    pub(crate) fn columns(self) -> Vec<Column> {
-        match self {
-            Self::Time => vec![Column::Time],
-            Self::Step => vec![Column::Step],
-            Self::Temperature => vec![Column::Temperature],
-            Self::Gyro => [0, 1, 2].map(Column::Raw).into(),
-            Self::Accel => [3, 4, 5].map(Column::Raw).into(),
-            Self::Rate => [0, 1, 2].map(Column::Reference).into(),
-            Self::Force => [3, 4, 5].map(Column::Reference).into(),
-        }
-    }
-
-    fn of(column: Column) -> (Self, usize) {
-        match column {
-            Column::Time => (Self::Time, 0),
-            Column::Step => (Self::Step, 0),
-            Column::Temperature => (Self::Temperature, 0),
-            Column::Raw(i) if i < 3 => (Self::Gyro, i),
-            Column::Raw(i) => (Self::Accel, i - 3),
-            Column::Reference(i) if i < 3 => (Self::Rate, i),
-            Column::Reference(i) => (Self::Force, i - 3),
-        }
-    }
+macro_rules! triad {
+    ($column:ident, $first:literal) => {
+        &[
+            Column::$column($first),
+            Column::$column($first + 1),
+            Column::$column($first + 2),
+        ]
+    };
 }
 
-/// The Python arrays of a recording, in the order of [`Field::ALL`].
+/// All arrays, the times first.
+#[rustfmt::skip]
+pub(crate) const FIELDS: [Field; 7] = [
+    Field { name: "t", columns: &[Column::Time] },
+    Field { name: "step", columns: &[Column::Step] },
+    Field { name: "temp", columns: &[Column::Temperature] },
+    Field { name: "gyro", columns: triad!(Raw, 0) },
+    Field { name: "accel", columns: triad!(Raw, 3) },
+    Field { name: "ref_rate_dps", columns: triad!(Reference, 0) },
+    Field { name: "ref_force_mps2", columns: triad!(Reference, 3) },
+];
+pub(crate) const TIME: Field = FIELDS[0];
+pub(crate) const SENSORS: [Field; 2] = [FIELDS[3], FIELDS[4]];
+
+/// The Python arrays of a recording, by keyword.
 #[derive(Debug)]
-pub(crate) struct Arrays {
-    arrays: [Option<Py<PyArrayDyn<f64>>>; 7],
-    rows: usize,
-}
+pub(crate) struct Arrays(BTreeMap<&'static str, Py<PyArrayDyn<f64>>>, usize);
 
 impl Arrays {
     /// Of what `each` gives for a field.
     pub(crate) fn of<'py>(
-        py: Python<'py>,
         mut each: impl FnMut(Field) -> PyResult<Option<Bound<'py, PyArrayDyn<f64>>>>,
     ) -> PyResult<Self> {
-        let mut arrays = [const { None }; 7];
-        for field in Field::ALL {
-            arrays[field as usize] = each(field)?.map(Bound::unbind);
+        let (mut arrays, mut rows) = (BTreeMap::new(), 0);
+        for field in FIELDS {
+            let Some(array) = each(field)? else { continue };
+            rows = array.shape()[0];
+            arrays.insert(field.name, array.unbind());
         }
-        let rows = arrays[0]
-            .as_ref()
-            .map_or(0, |t: &Py<PyArrayDyn<f64>>| t.bind(py).shape()[0]);
-        Ok(Self { arrays, rows })
+        Ok(Self(arrays, rows))
     }
 
     pub(crate) fn get<'py>(
@@ -102,33 +67,35 @@ impl Arrays {
         py: Python<'py>,
         field: Field,
     ) -> Option<Bound<'py, PyArrayDyn<f64>>> {
-        self.arrays[field as usize]
-            .as_ref()
-            .map(|array| array.bind(py).clone())
+        self.0.get(field.name).map(|array| array.bind(py).clone())
     }
 }
 
 impl InMemory for Arrays {
     fn rows(&self) -> usize {
-        self.rows
+        self.1
     }
 
     fn columns(&self) -> Columns {
-        let has = |field: Field| self.arrays[field as usize].is_some();
-        let [rate, force] = [has(Field::Rate), has(Field::Force)];
+        let has = |name| self.0.contains_key(name);
+        let [rate, force] = ["ref_rate_dps", "ref_force_mps2"].map(has);
         Columns {
-            step: has(Field::Step),
-            temp_c: has(Field::Temperature),
-            gyro: has(Field::Gyro),
-            accel: has(Field::Accel),
+            step: has("step"),
+            temp_c: has("temp"),
+            gyro: has("gyro"),
+            accel: has("accel"),
             reference: [rate, rate, rate, force, force, force],
         }
     }
 
     /// Holds the interpreter's lock, so that Python cannot write into an array meanwhile; for 65,536 rows at a time.
     fn append(&self, column: Column, rows: Range<usize>, values: &mut Vec<f64>) -> Result<()> {
-        let (field, axis) = Field::of(column);
-        let Some(array) = &self.arrays[field as usize] else {
+        let of =
+            |field: &Field| Some((field.name, field.columns.iter().position(|c| *c == column)?));
+        let Some((name, axis)) = FIELDS.iter().find_map(of) else {
+            return Ok(());
+        };
+        let Some(array) = self.0.get(name) else {
             return Ok(());
         };
         let changed = || {
@@ -258,9 +225,9 @@ pub(crate) fn array<'py>(
     field: Field,
     rows: Option<usize>,
 ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-    let array = doubles(&ordered(value)?, field.name())?;
+    let array = doubles(&ordered(value)?, field.name)?;
     let array = array.cast_into::<PyArrayDyn<f64>>()?;
-    let (inner, remedy): (&[usize], _) = match field.columns().len() {
+    let (inner, remedy): (&[usize], _) = match field.columns.len() {
         1 => (&[], "give a number for each sample"),
         _ => (&[3], "give x, y and z of each sample in a row"),
     };
@@ -279,10 +246,7 @@ pub(crate) fn array<'py>(
         format!("({all}, 3)")
     };
     let problem = format!("its shape is {shape}, but {needed} is needed");
-    Err(raised(
-        value.py(),
-        &Error::new(field.name(), problem, remedy),
-    ))
+    Err(raised(value.py(), &Error::new(field.name, problem, remedy)))
 }
 
 /// Three numbers for each sample of a sensor.
@@ -295,13 +259,10 @@ pub(crate) fn triad<'py>(
 
 /// The factor of a sensor's readings to their unit, of what [`units_of`] gives.
 pub(crate) fn factor_of(py: Python<'_>, factors: [Option<f64>; 2], field: Field) -> PyResult<f64> {
-    let factor = match field {
-        Field::Gyro => factors[0],
-        Field::Accel => factors[1],
-        _ => Some(1.0),
-    };
+    let sensor = SENSORS.iter().position(|sensor| sensor.name == field.name);
+    let factor = sensor.map_or(Some(1.0), |sensor| factors[sensor]);
     factor.ok_or_else(|| {
-        let problem = format!("the unit of the {} is not given", field.name());
+        let problem = format!("the unit of the {} is not given", field.name);
         let remedy = "give both units, as in units=\"deg/s,g\"";
         raised(py, &Error::new("units", problem, remedy))
     })

@@ -17,7 +17,7 @@ use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::arrays::{Field, factor_of, ordered, triad, units_of};
+use crate::arrays::{SENSORS, factor_of, ordered, triad, units_of};
 use crate::error::raised;
 use crate::recording::Recording;
 use crate::work::{computed, loaded};
@@ -255,7 +255,7 @@ impl Calibration {
         if accel.cast::<Recording>().is_ok() {
             return Ok(());
         }
-        let readings = triad(accel, Field::Accel)?.readonly();
+        let readings = triad(accel, SENSORS[1])?.readonly();
         let rows = readings.as_array();
         let mut sizes: Vec<f64> = rows
             .rows()
@@ -320,10 +320,7 @@ impl Calibration {
                     &Error::new(&self.name, problem, "leave these readings out"),
                 )
             })?;
-            let field = match sensor {
-                Sensor::Gyro => Field::Gyro,
-                Sensor::Accel => Field::Accel,
-            };
+            let field = SENSORS[sensor as usize];
             let readings = triad(readings, field)?.readonly();
             let view = readings.as_array();
             let factor = factor_of(py, factors, field)?;

@@ -3,9 +3,11 @@
 use std::ffi::OsString;
 use std::sync::Arc;
 
-use mimu::diagnosed::Diagnosed;
-use mimu_cli::called;
+use mimu::diagnose::Recordings;
+use mimu::diagnosed::{Diagnosed, diagnosed};
+use mimu_cli::called::{DiagnoseArgs, of_contents};
 use mimu_cli::report::{self, Detail, Made, fragment};
+use mimu_recording::error::Result;
 use pyo3::prelude::*;
 
 use crate::calibration::Calibration;
@@ -72,22 +74,34 @@ pub(crate) fn diagnose(
     noise: Option<&Noise>,
 ) -> PyResult<Diagnosis> {
     let all = sources(py, &recordings)?;
-    let second = verify.map(|recording| &recording.source);
-    for source in all.iter().chain(second) {
-        source.samples().map_err(|error| raised(py, &error))?;
-    }
-    let open: Vec<_> = all.iter().map(Source::opener).collect();
-    let second = second.map(Source::opener);
+    let second = verify.map(|recording| recording.source.clone());
     let given = calibration.map(|c| (c.model.clone(), c.name.clone()));
     let noise = noise.map(|noise| noise.file.clone());
     let created = mimu_cli::now();
     let now = created.clone();
     let work = move || {
-        let given = given
-            .as_ref()
-            .map(|(model, name)| (model.as_ref(), name.as_str()));
-        let second = second.as_deref();
-        called::diagnose(arguments, &open, second, noise.as_deref(), given, &now)
+        let args: DiagnoseArgs = of_contents("diagnose", arguments)?;
+        let open = |source: &Source| {
+            source.samples()?;
+            args.opened(&*source.opener(), noise.as_deref())
+        };
+        let mut all: Vec<_> = all.iter().map(open).collect::<Result<_>>()?;
+        let second = second.as_ref().map(open).transpose()?;
+        let name = second.as_ref().map(|second| second.manifest.device.clone());
+        let recordings = Recordings {
+            first: all.remove(0),
+            more: all,
+            second,
+            given: given.as_ref().map(|(model, _)| model.as_ref()),
+            accept: args.accept.clone(),
+        };
+        let given = given.as_ref().map(|(_, name)| name.as_str());
+        Ok(diagnosed(
+            recordings,
+            [name.as_deref(), given],
+            &now,
+            &|_| (),
+        )?)
     };
     let done = done(py, work, refused)?;
     Ok(Diagnosis { done, created })

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use mimu::quantity::Sensor;
 use mimu::result::sessions::SessionsResult;
-use mimu_cli::called::{self, FitMade};
+use mimu_cli::called::{FitArgs, FitMade, of_contents};
 use mimu_cli::report::{self, fragment};
 use pyo3::prelude::*;
 
@@ -114,7 +114,10 @@ pub(crate) fn fit(
 ) -> PyResult<Fit> {
     let (open, units) = (recording.source.opener(), recording.units.clone());
     let noise = noise.map(|noise| noise.file.clone());
-    let work = move || called::fit(arguments, &*open, noise.as_deref());
+    let work = move || {
+        let args: FitArgs = of_contents("fit", arguments)?;
+        Ok(args.fitted(&*open, noise.as_deref())?)
+    };
     let made = done(py, work, refused)?;
     let model = Arc::new(made.calibration.clone());
     Ok(Fit { made, model, units })
@@ -134,7 +137,10 @@ pub(crate) fn fit_sessions(
         .map(|s| s.opener())
         .collect();
     let noise = noise.map(|noise| noise.file.clone());
-    let work = move || called::fit_sessions(arguments, &open, noise.as_deref());
+    let work = move || {
+        let args: FitArgs = of_contents("fit", arguments)?;
+        Ok(args.combined(&open, noise.as_deref())?)
+    };
     let (result, model) = done(py, work, refused)?;
     Ok(SessionsFit {
         result,

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use mimu::in_use;
 use mimu::noise::noise_file::NoiseFile;
-use mimu_cli::called;
+use mimu_cli::called::{NoiseInUseArgs, of_contents};
 use mimu_cli::report::{self, fragment};
 use mimu_recording::result_file::stage;
 use pyo3::prelude::*;
@@ -130,7 +130,8 @@ pub(crate) fn noise_in_use(
             Some(given) => given,
             None => Arc::new(mimu::Calibration::of_si(&samples.manifest)?),
         };
-        let found = called::noise_in_use(arguments, samples, &model, &noise)?;
+        let args: NoiseInUseArgs = of_contents("noise", arguments)?;
+        let found = args.found(samples, &model, &noise, &|_| ())?;
         Ok(NoiseInUse { found })
     };
     done(py, work, refused)

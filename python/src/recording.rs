@@ -21,7 +21,9 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PySlice};
 use tempfile::TempDir;
 
-use crate::arrays::{Arrays, Field, array, factor_of, is_of_dates, units_of, without_times};
+use crate::arrays::{
+    Arrays, FIELDS, Field, TIME, array, factor_of, is_of_dates, units_of, without_times,
+};
 use crate::error::{keywords, raised, refused};
 use crate::work::{computed, done, json, loaded};
 
@@ -178,7 +180,7 @@ impl Recording {
             t.or(index.as_ref().filter(|index| is_of_dates(index))),
             rate_hz,
         ) {
-            (Some(t), _) => array(t, Field::Time, None)?,
+            (Some(t), _) => array(t, TIME, None)?,
             (None, Some(rate)) => {
                 let rows = gyro.or(accel).map_or(Ok(0), |table| table.len())?;
                 let times = PyArray1::from_iter(py, (0..rows).map(|row| row as f64 / rate));
@@ -199,15 +201,15 @@ impl Recording {
         let mut manifest = Manifest::new(device, rate_hz, gravity_mps2, unit, reference);
         manifest.latitude_deg = latitude_deg;
         manifest.power_on_s = power_on_s;
-        let arrays = Arrays::of(py, |field| {
-            let value = match field {
-                Field::Time => return Ok(Some(t.clone())),
-                Field::Step => step,
-                Field::Temperature => temp,
-                Field::Gyro => gyro,
-                Field::Accel => accel,
-                Field::Rate => ref_rate_dps,
-                Field::Force => ref_force_mps2,
+        let arrays = Arrays::of(|field| {
+            let value = match field.name {
+                "t" => return Ok(Some(t.clone())),
+                "step" => step,
+                "temp" => temp,
+                "gyro" => gyro,
+                "accel" => accel,
+                "ref_rate_dps" => ref_rate_dps,
+                _ => ref_force_mps2,
             };
             let Some(value) = value else {
                 return Ok(None);
@@ -239,7 +241,7 @@ impl Recording {
             );
             return Err(raised(py, &error));
         }
-        let arrays = Arrays::of(py, |field| {
+        let arrays = Arrays::of(|field| {
             let Some(array) = self.field(py, field)? else {
                 return Ok(None);
             };
@@ -263,8 +265,8 @@ impl Recording {
             let samples = self.source.samples().map_err(|error| raised(py, &error))?;
             let manifest = samples.manifest.to_toml();
             said.set_item("manifest", manifest.map_err(|error| raised(py, &error))?)?;
-            for field in Field::ALL {
-                said.set_item(field.name(), self.field(py, field)?)?;
+            for field in FIELDS {
+                said.set_item(field.name, self.field(py, field)?)?;
             }
             return Ok((
                 module.getattr("unpickled_arrays")?,
@@ -305,43 +307,43 @@ impl Recording {
     /// Times of the samples, s.
     #[getter]
     fn t<'py>(&self, py: Python<'py>) -> PyResult<Values<'py>> {
-        self.field(py, Field::Time)
+        self.field(py, FIELDS[0])
     }
 
     /// Readings of the gyro, a row for each sample, in `unit`; None without a gyro.
     #[getter]
     fn gyro<'py>(&self, py: Python<'py>) -> PyResult<Values<'py>> {
-        self.field(py, Field::Gyro)
+        self.field(py, FIELDS[3])
     }
 
     /// Readings of the accelerometer, a row for each sample, in `unit`; None without one.
     #[getter]
     fn accel<'py>(&self, py: Python<'py>) -> PyResult<Values<'py>> {
-        self.field(py, Field::Accel)
+        self.field(py, FIELDS[4])
     }
 
     /// Temperatures, degrees Celsius; None without a thermometer.
     #[getter]
     fn temp_c<'py>(&self, py: Python<'py>) -> PyResult<Values<'py>> {
-        self.field(py, Field::Temperature)
+        self.field(py, FIELDS[2])
     }
 
     /// Number of the dwell of each sample, -1 in transit; None if the dwells are found by stillness.
     #[getter]
     fn step<'py>(&self, py: Python<'py>) -> PyResult<Values<'py>> {
-        self.field(py, Field::Step)
+        self.field(py, FIELDS[1])
     }
 
     /// Known rates, deg/s; None without any.
     #[getter]
     fn ref_rate_dps<'py>(&self, py: Python<'py>) -> PyResult<Values<'py>> {
-        self.field(py, Field::Rate)
+        self.field(py, FIELDS[5])
     }
 
     /// Known specific forces, m/s²; None without any.
     #[getter]
     fn ref_force_mps2<'py>(&self, py: Python<'py>) -> PyResult<Values<'py>> {
-        self.field(py, Field::Force)
+        self.field(py, FIELDS[6])
     }
 
     /// Name of the unit.
@@ -469,14 +471,22 @@ impl Recording {
         let made = mimu_recording::Recording::in_memory(manifest, arrays.clone());
         let made = made.map_err(|error| raised(py, &error))?;
         Ok(Self {
-            source: Source::Samples(Arc::new(made)),
             arrays: Some(arrays),
-            imported: None,
             warnings,
+            ..Self::of(Source::Samples(Arc::new(made)))
+        })
+    }
+
+    fn of(source: Source) -> Self {
+        Self {
+            source,
+            arrays: None,
+            imported: None,
+            warnings: Vec::new(),
             directory: None,
             folder: None,
             units: None,
-        })
+        }
     }
 
     fn sensors(&self) -> String {
@@ -504,7 +514,7 @@ impl Recording {
             return Ok(arrays.get(py, field));
         }
         let samples = self.source.samples().map_err(|error| raised(py, &error))?;
-        let columns = field.columns();
+        let columns = field.columns;
         let has = |column: &Column| samples.columns.has(*column);
         // The input may be known for some axes only.
         let there: Vec<Column> = columns.iter().copied().filter(has).collect();
@@ -555,13 +565,8 @@ pub(crate) fn open(py: Python<'_>, directory: PathBuf) -> PyResult<Recording> {
     let opened = directory.clone();
     let source = computed(py, move || Source::open(&opened))?;
     Ok(Recording {
-        source,
-        arrays: None,
-        imported: None,
-        warnings: Vec::new(),
         directory: Some(directory),
-        folder: None,
-        units: None,
+        ..Recording::of(source)
     })
 }
 
@@ -580,7 +585,7 @@ where
 pub(crate) fn unpickled_arrays(py: Python<'_>, said: &Bound<'_, PyDict>) -> PyResult<Recording> {
     let text: String = pickled(said, "manifest")?;
     let manifest = Manifest::parse(&text, "pickle").map_err(|error| raised(py, &error))?;
-    let arrays = Arrays::of(py, |field| pickled(said, field.name()))?;
+    let arrays = Arrays::of(|field| pickled(said, field.name))?;
     let made = Recording::of_arrays(py, manifest, arrays, pickled(said, "warnings")?)?;
     Ok(Recording {
         units: pickled(said, "units")?,
@@ -605,13 +610,11 @@ pub(crate) fn unpickled_files(
     };
     let (source, folder) = computed(py, work)?;
     Ok(Recording {
-        source,
-        arrays: None,
         imported: pickled(said, "imported")?,
         warnings: pickled(said, "warnings")?,
         directory: Some(folder.0.path().to_owned()),
         folder: Some(Arc::new(folder)),
-        units: None,
+        ..Recording::of(source)
     })
 }
 
@@ -638,8 +641,6 @@ pub(crate) fn read(
     };
     let (source, summary, directory, folder) = done(py, work, refused)?;
     Ok(Recording {
-        source,
-        arrays: None,
         imported: Some(json(&summary)?),
         warnings: summary
             .warnings
@@ -648,7 +649,7 @@ pub(crate) fn read(
             .collect::<PyResult<_>>()?,
         directory: Some(directory),
         folder,
-        units: None,
+        ..Recording::of(source)
     })
 }
 

@@ -3,7 +3,7 @@
 use std::ffi::OsString;
 use std::sync::Arc;
 
-use mimu_cli::called;
+use mimu_cli::called::{ThermalFitArgs, of_contents};
 use mimu_cli::report::{self, Made, fragment};
 use mimu_recording::error::Result;
 use mimu_thermal::base;
@@ -80,17 +80,17 @@ pub(crate) fn thermal_fit(
     let base = base.map(|base| base.model.clone());
     let noise = noise.map(|noise| noise.file.clone());
     let work = move || {
-        let (search, options) = called::thermal_fit(arguments)?;
+        let args: ThermalFitArgs = of_contents("fit", arguments)?;
         let session = |source: &Source| {
             source.samples()?;
-            let prepared = source.opener()(search)?;
+            let prepared = source.opener()(args.search())?;
             match &noise {
                 Some(noise) => Session::of(&prepared.with_noise(noise)?),
                 None => Session::of(&prepared),
             }
         };
         let all = |list: &[Source]| list.iter().map(session).collect::<Result<Vec<_>>>();
-        let fitted = fit(all(&sources)?, &all(&verify)?, options)?;
+        let fitted = fit(all(&sources)?, &all(&verify)?, args.options())?;
         Ok(ThermalFit {
             result: ThermalResult::of(&fitted),
             fitted,

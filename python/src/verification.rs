@@ -2,7 +2,7 @@
 
 use std::ffi::OsString;
 
-use mimu_cli::called::{self, Verified};
+use mimu_cli::called::{Verified, VerifyArgs, of_contents};
 use mimu_cli::report::fragment;
 use pyo3::prelude::*;
 
@@ -49,7 +49,10 @@ pub(crate) fn verify(
 ) -> PyResult<Verification> {
     let (open, model) = (recording.source.opener(), calibration.model.clone());
     let noise = noise.map(|noise| noise.file.clone());
-    let work = move || called::verify(arguments, &*open, noise.as_deref(), &model);
+    let work = move || {
+        let args: VerifyArgs = of_contents("verify", arguments)?;
+        Ok(args.judged(&*open, noise.as_deref(), &model)?)
+    };
     Ok(Verification {
         verified: done(py, work, refused)?,
         recording: recording.source.manifest().device.clone(),

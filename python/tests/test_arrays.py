@@ -46,7 +46,7 @@ def test_dates_and_durations_are_seconds(arrays: mimu.Recording) -> None:
 
 
 def test_a_result_or_its_file_is_taken_for_what_it_gives(arrays: mimu.Recording, tmp_path: Path) -> None:
-    rows = np.hstack([arrays.gyro[:1], arrays.accel[:1]]) + np.random.default_rng(3).normal(size=(6000, 6)) * 4
+    rows = np.hstack([arrays.gyro[:1], arrays.accel[:1]]) + np.random.default_rng(3).normal(size=(6000, 6))
     still = mimu.Recording(None, rows[:, :3], rows[:, 3:], unit="count", gravity=9.80665, rate_hz=50.0, device=arrays.device)
     noise, fit = mimu.allan(still), mimu.fit(arrays)
     noise.save(tmp_path / "noise.toml")

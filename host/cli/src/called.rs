@@ -5,34 +5,22 @@ use std::pin::Pin;
 use std::sync::mpsc::Receiver;
 
 use clap::{Args, CommandFactory, Parser};
-use mimu::calibration::Calibration;
-use mimu::diagnose::Recordings;
-use mimu::diagnosed::{Diagnosed, diagnosed};
-use mimu::in_use::NoiseInUse;
-use mimu::noise::noise_file::NoiseFile;
-use mimu::prepared::Prepared;
-use mimu::result::sessions::SessionsResult;
-use mimu::signal::stillness::DwellSearch;
-use mimu::survey;
 use mimu_export::{Export, Format, Sources};
+use mimu_recording::ImportSummary;
 use mimu_recording::error::Error;
-use mimu_recording::{ImportSummary, Recording};
-use mimu_thermal::fit::Options as ThermalOptions;
 use mimu_wizard::event::View;
 use mimu_wizard::relay::Stamped;
 use mimu_wizard::session::Outcome;
 
 use crate::Cli;
-use crate::cmd::allan::AllanArgs;
+pub use crate::cmd::allan::AllanArgs;
 use crate::cmd::design::DesignArgs;
 pub use crate::cmd::design::Designed;
-use crate::cmd::diagnose::DiagnoseArgs;
-use crate::cmd::fit::FitArgs;
-pub use crate::cmd::fit::{FitMade, Open};
-use crate::cmd::noise::NoiseInUseArgs;
-use crate::cmd::thermal::FitArgs as ThermalFitArgs;
-pub use crate::cmd::verify::Verified;
-use crate::cmd::verify::VerifyArgs;
+pub use crate::cmd::diagnose::DiagnoseArgs;
+pub use crate::cmd::fit::{FitArgs, FitMade, Open};
+pub use crate::cmd::noise::NoiseInUseArgs;
+pub use crate::cmd::thermal::FitArgs as ThermalFitArgs;
+pub use crate::cmd::verify::{Verified, VerifyArgs};
 use crate::cmd::wizard::{WizardArgs, session};
 use crate::hint::{self, OF_A_LOG};
 use crate::importing::{ImportArgs, imported};
@@ -66,106 +54,6 @@ pub fn import(arguments: Vec<OsString>) -> Result<ImportSummary, Refusal> {
 /// See [`Refusal`].
 pub fn design(arguments: Vec<OsString>) -> Result<(Designed, Option<String>), Refusal> {
     Ok(parsed::<DesignArgs>("design", arguments)?.made()?)
-}
-
-/// The fit of the recording that `open` reads, with the arguments of `mimu fit` but the recording and the noise.
-///
-/// # Errors
-/// See [`Refusal`].
-pub fn fit(
-    arguments: Vec<OsString>,
-    open: &Open,
-    noise: Option<&NoiseFile>,
-) -> Result<FitMade, Refusal> {
-    Ok(of_recording::<FitArgs>("fit", arguments)?.fitted(open, noise)?)
-}
-
-/// One calibration of the sessions that `open` reads, as [`fit`].
-///
-/// # Errors
-/// See [`Refusal`].
-pub fn fit_sessions(
-    arguments: Vec<OsString>,
-    open: &[Box<Open>],
-    noise: Option<&NoiseFile>,
-) -> Result<(SessionsResult, Calibration), Refusal> {
-    Ok(of_recording::<FitArgs>("fit", arguments)?.combined(open, noise)?)
-}
-
-/// A calibration judged by the recording that `open` reads, with the arguments of `mimu verify` but the files.
-///
-/// # Errors
-/// See [`Refusal`].
-pub fn verify(
-    mut arguments: Vec<OsString>,
-    open: &Open,
-    noise: Option<&NoiseFile>,
-    calibration: &Calibration,
-) -> Result<Verified, Refusal> {
-    arguments.push("--calibration=given".into());
-    let args = of_recording::<VerifyArgs>("verify", arguments)?;
-    Ok(args.judged(open, noise, calibration)?)
-}
-
-/// The diagnosis of the recordings that `open` reads, with the arguments of `mimu diagnose` but the files. `second` judges only; `given` is a calibration
-/// that is kept, with its name.
-///
-/// # Errors
-/// See [`Refusal`].
-pub fn diagnose(
-    arguments: Vec<OsString>,
-    open: &[Box<Open>],
-    second: Option<&Open>,
-    noise: Option<&NoiseFile>,
-    given: Option<(&Calibration, &str)>,
-    created: &str,
-) -> Result<Diagnosed, Refusal> {
-    let args = of_recording::<DiagnoseArgs>("diagnose", arguments)?;
-    let all: Result<Vec<Prepared>, Error> = open.iter().map(|o| args.opened(o, noise)).collect();
-    let mut all = all?;
-    let second = second.map(|open| args.opened(open, noise)).transpose()?;
-    let name = second.as_ref().map(|second| second.manifest.device.clone());
-    let recordings = Recordings {
-        first: all.remove(0),
-        more: all,
-        second,
-        given: given.map(|(model, _)| model),
-        accept: args.accept,
-    };
-    let names = [name.as_deref(), given.map(|(_, name)| name)];
-    Ok(diagnosed(recordings, names, created, &|_| ())?)
-}
-
-/// What `mimu allan` with these arguments surveys, and how.
-///
-/// # Errors
-/// See [`Refusal`].
-pub fn allan(arguments: Vec<OsString>) -> Result<survey::Options, Refusal> {
-    Ok(of_recording::<AllanArgs>("allan", arguments)?.options()?)
-}
-
-/// Noise in use, with the arguments of `mimu noise` but the recording and the files of the unit.
-///
-/// # Errors
-/// See [`Refusal`].
-pub fn noise_in_use(
-    mut arguments: Vec<OsString>,
-    recording: &Recording,
-    calibration: &Calibration,
-    noise: &NoiseFile,
-) -> Result<NoiseInUse, Refusal> {
-    arguments.push("--noise=given".into());
-    let args = of_recording::<NoiseInUseArgs>("noise", arguments)?;
-    Ok(args.found(recording, calibration, noise, &|_| ())?)
-}
-
-/// How dwells are found and curves estimated by `mimu thermal fit` with these arguments.
-///
-/// # Errors
-/// See [`Refusal`].
-pub fn thermal_fit(arguments: Vec<OsString>) -> Result<(DwellSearch, ThermalOptions), Refusal> {
-    let args = of_recording::<ThermalFitArgs>("fit", arguments)?;
-    Ok((args.search(), args.options()))
 }
 
 /// File of `mimu export`; its arguments begin with the name of the format.
@@ -232,9 +120,20 @@ pub fn flags(error: &Error) -> Vec<&'static str> {
     arguments.iter().filter_map(|a| hint::flag(*a)).collect()
 }
 
-/// Arguments of a command that names a recording, which the caller has at hand.
-fn of_recording<A: Args>(name: &'static str, mut arguments: Vec<OsString>) -> Result<A, Refusal> {
-    arguments.push("given".into());
+/// The arguments `A` of the command `name`, but the files that it requires: the caller has their contents at hand.
+///
+/// # Errors
+/// See [`Refusal`].
+pub fn of_contents<A: Args>(
+    name: &'static str,
+    mut arguments: Vec<OsString>,
+) -> Result<A, Refusal> {
+    let required = A::augment_args(clap::Command::new(name));
+    let required = required.get_arguments().filter(|a| a.is_required_set());
+    arguments.extend(required.map(|a| match a.get_long() {
+        Some(long) => format!("--{long}=given").into(),
+        None => "given".into(),
+    }));
     parsed(name, arguments)
 }
 

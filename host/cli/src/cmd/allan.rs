@@ -19,6 +19,7 @@ use crate::output::{check_outputs, now, print, progress};
 use crate::reading::{LogArgs, open};
 use crate::status::Status;
 
+/// Arguments of `mimu allan`.
 #[derive(Args)]
 pub struct AllanArgs {
     /// Directory of a recording of the unit at rest; several of one unit, each at another temperature
@@ -92,7 +93,7 @@ impl AllanArgs {
     ///
     /// # Errors
     /// The segment ends before it begins.
-    pub(crate) fn options(&self) -> Result<Options> {
+    pub fn options(&self) -> Result<Options> {
         Ok(Options {
             part: match (self.step, self.from, self.to) {
                 (Some(step), ..) => Part::Step(step),

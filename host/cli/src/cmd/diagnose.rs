@@ -25,6 +25,7 @@ use crate::reading::{LogArgs, read};
 use crate::report::refused;
 use crate::status::Status;
 
+/// Arguments of `mimu diagnose`.
 #[derive(Args)]
 pub struct DiagnoseArgs {
     /// Directory of the recording; several of one unit are diagnosed together, each with its own biases, and the calibration is that of the
@@ -41,7 +42,7 @@ pub struct DiagnoseArgs {
     calibration: Option<PathBuf>,
     /// Accept this product (`term:...`) on the evidence of this recording alone
     #[arg(long, value_name = "ID")]
-    pub(crate) accept: Vec<String>,
+    pub accept: Vec<String>,
     /// Calibration file to write, with the effects that were found
     #[arg(short, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -76,7 +77,10 @@ pub struct DiagnoseArgs {
 
 impl DiagnoseArgs {
     /// The recording that `open` reads, with all that the arguments state.
-    pub(crate) fn opened(
+    ///
+    /// # Errors
+    /// The recording is refused.
+    pub fn opened(
         &self,
         open: &dyn Fn(DwellSearch) -> Result<Prepared>,
         noise: Option<&NoiseFile>,

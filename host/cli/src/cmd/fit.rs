@@ -35,8 +35,9 @@ use crate::report::data_sheet::{WithDataSheet, data_sheet_text};
 use crate::report::refused;
 use crate::status::Status;
 
+/// Arguments of `mimu fit`.
 #[derive(Args)]
-pub(crate) struct FitArgs {
+pub struct FitArgs {
     /// Recording, of samples or of means, or a log that `mimu import` reads. Several are sessions of one unit, in the order in which they took place
     ///
     /// One calibration is then made from all, with two intervals for each parameter: of the expected value, and of what the next power-on makes of it.
@@ -199,7 +200,10 @@ impl FitArgs {
     }
 
     /// The fit of the recording that `open` reads, without the list of dwells after a refusal.
-    pub(crate) fn fitted(&self, open: &Open, noise: Option<&NoiseFile>) -> Result<FitMade> {
+    ///
+    /// # Errors
+    /// The recording, or a file of the arguments, is refused; the recording does not determine the calibration.
+    pub fn fitted(&self, open: &Open, noise: Option<&NoiseFile>) -> Result<FitMade> {
         self.part.part()?;
         let prepared = self.complete(open(self.still.search())?, noise)?;
         let fit = fit_or_faces(prepared, self.options())?;
@@ -218,7 +222,10 @@ impl FitArgs {
     }
 
     /// One calibration of the sessions that `open` reads.
-    pub(crate) fn combined(
+    ///
+    /// # Errors
+    /// As of [`Self::fitted`], or the sessions are not of one unit.
+    pub fn combined(
         &self,
         open: &[Box<Open>],
         noise: Option<&NoiseFile>,

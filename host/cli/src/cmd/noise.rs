@@ -20,8 +20,9 @@ use crate::reading::{LogArgs, open};
 use crate::report;
 use crate::status::Status;
 
+/// Arguments of `mimu noise`.
 #[derive(Args)]
-pub(crate) struct NoiseInUseArgs {
+pub struct NoiseInUseArgs {
     /// Recording in motion, with rests before and after each motion, or with a trajectory; or a log that `mimu import` reads
     recording: PathBuf,
     /// Calibration of the unit, not made from this recording; readings in rad/s and m/s² need none
@@ -93,7 +94,10 @@ pub(crate) fn run(args: &NoiseInUseArgs) -> Result<Status> {
 
 impl NoiseInUseArgs {
     /// The noise that the recording shows.
-    pub(crate) fn found(
+    ///
+    /// # Errors
+    /// The recording or the trajectory is refused.
+    pub fn found(
         &self,
         recording: &Recording,
         calibration: &Calibration,

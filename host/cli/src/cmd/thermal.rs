@@ -46,8 +46,9 @@ enum ThermalCommand {
     Record(record::RecordArgs),
 }
 
+/// Arguments of `mimu thermal fit`.
 #[derive(Args)]
-pub(crate) struct FitArgs {
+pub struct FitArgs {
     /// Directories of the recordings of one unit, one for each power-on
     #[arg(required = true)]
     recordings: Vec<PathBuf>,
@@ -97,7 +98,7 @@ pub(crate) struct FitArgs {
 
 impl FitArgs {
     /// How the dwells are found.
-    pub(crate) fn search(&self) -> DwellSearch {
+    pub fn search(&self) -> DwellSearch {
         let mut search = self.still.search();
         if self.at_rest {
             search.steps = Steps::AtRest;
@@ -106,7 +107,7 @@ impl FitArgs {
     }
 
     /// How the curves are estimated.
-    pub(crate) fn options(&self) -> Options {
+    pub fn options(&self) -> Options {
         Options {
             estimator: self.estimator.estimator(),
             lag_s: self.lag,

@@ -22,8 +22,9 @@ use crate::report;
 use crate::report::data_sheet::{WithDataSheet, data_sheet_text};
 use crate::status::Status;
 
+/// Arguments of `mimu verify`.
 #[derive(Args)]
-pub(crate) struct VerifyArgs {
+pub struct VerifyArgs {
     /// Recording, of samples or of means, or a log that `mimu import` reads
     recording: PathBuf,
     /// Calibration file
@@ -66,7 +67,10 @@ pub(crate) fn run(args: &VerifyArgs) -> Result<Status> {
 
 impl VerifyArgs {
     /// `calibration` judged by the recording that `open` reads.
-    pub(crate) fn judged(
+    ///
+    /// # Errors
+    /// The recording or the part is refused.
+    pub fn judged(
         &self,
         open: &dyn Fn(DwellSearch) -> Result<Prepared>,
         noise: Option<&NoiseFile>,
