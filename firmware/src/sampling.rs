@@ -103,7 +103,7 @@ impl Tally {
 }
 
 /// Lets these interrupts of the line to the host wait for sampling, which the drivers leave above it.
-pub fn goes_before(line: &[interrupt::Interrupt]) {
+pub fn waits_for_sampling(line: &[interrupt::Interrupt]) {
     line.iter().for_each(|one| one.set_priority(Priority::P2));
 }
 

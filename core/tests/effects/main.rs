@@ -474,7 +474,7 @@ fn what_cannot_be_removed_is_refused() {
         refused("gyro_scale_cubic", &[f64::NAN; 3], None),
         EffectError::Value
     );
-    // An error as large as the input at 1 g, at 1 rad/s or after 10 K is no correction.
+    // No correction is as large as the input at 1 g, at 1 rad/s or after 10 K.
     for (id, coefficients, size) in [
         ("accel_scale_cubic", 3, 3e38),
         ("accel_scale_cubic", 3, 0.02),

@@ -155,13 +155,13 @@ mod parts {
                 watchdog,
             };
             #[cfg(not(feature = "usb"))]
-            sampling::goes_before(&[
+            sampling::waits_for_sampling(&[
                 interrupt::UART7,
                 interrupt::DMA1_STREAM1,
                 interrupt::DMA1_STREAM2,
             ]);
             #[cfg(feature = "usb")]
-            sampling::goes_before(&[interrupt::OTG_FS]);
+            sampling::waits_for_sampling(&[interrupt::OTG_FS]);
             board
         }
     }
