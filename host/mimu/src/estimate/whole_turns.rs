@@ -72,6 +72,20 @@ pub(crate) enum Ended {
     Open(f64),
 }
 
+/// Whole turns about an axis of the unit.
+struct AboutAxis {
+    /// Their place in the list.
+    at: usize,
+    /// 1 forwards, -1 backwards.
+    way: f64,
+    turns: f64,
+    /// The part of the direction up along their axis.
+    part: f64,
+    /// How much too far the gyro turns in them, rad, and the largest such error that the placement and the gyro allow.
+    over: f64,
+    limit: f64,
+}
+
 /// The whole turns found among the turns, and what is wrong with others.
 pub struct Found {
     /// Those that are used.
@@ -140,52 +154,56 @@ impl Stated {
             let about = all
                 .iter()
                 .enumerate()
-                .filter_map(|(k, (closure, refused))| {
-                    let counted = !matches!(refused, Some(Warning::WholeTurnsOpen { .. }));
-                    let part = closure.path.axis[axis];
+                .filter_map(|(at, (closure, refused))| {
+                    let along = closure.path.axis[axis];
+                    let open = matches!(refused, Some(Warning::WholeTurnsOpen { .. }));
+                    if open || along.abs() < NEAR_AXIS {
+                        return None;
+                    }
                     let own = &turns[closure.turns.clone()];
-                    let (part_of_axis, error) = closure.about_axis(own, gyro, self.vertical[0])?;
-                    let whole = closure.path.turns().round();
-                    let sigma = sigma(&closure.path, &error.block.by(0)) / part_of_axis.abs();
-                    let limit = EXPLAINED * self.placement + 3.0 * sigma;
-                    let over = error.block.residual[0] / part_of_axis;
-                    (counted && part.abs() >= NEAR_AXIS).then_some((
-                        k,
-                        part.signum(),
-                        whole,
-                        (part_of_axis, over, limit),
-                    ))
+                    let (part, error) = closure.about_axis(own, gyro, self.vertical[0])?;
+                    let sigma = sigma(&closure.path, &error.block.by(0)) / part.abs();
+                    Some(AboutAxis {
+                        at,
+                        way: along.signum(),
+                        turns: closure.path.turns().round(),
+                        part,
+                        over: error.block.residual[0] / part,
+                        limit: EXPLAINED * self.placement + 3.0 * sigma,
+                    })
                 });
-            let about: Vec<_> = about.collect();
-            let each_way = [1.0, -1.0].map(|way| {
-                let own = about.iter().filter(|t| t.1 == way);
+            let about: Vec<AboutAxis> = about.collect();
+            let [forwards, backwards] = [1.0, -1.0].map(|way| {
+                let own = about.iter().filter(|one| one.way == way);
                 let count = own.clone().count() as f64;
-                let per_turn = own.map(|t| t.3.1 / t.2).sum::<f64>() / count;
-                (count, per_turn)
+                (
+                    count,
+                    own.map(|one| one.over / one.turns).sum::<f64>() / count,
+                )
             });
-            let pairs = each_way[0].0.min(each_way[1].0);
-            if pairs < 1.0 {
-                continue;
-            }
-            let per_turn = 0.5 * (each_way[0].1 - each_way[1].1);
-            let fewest = about.iter().map(|t| t.2).fold(f64::INFINITY, f64::min);
-            let half = self.placement / (fewest * (2.0 * pairs).sqrt());
-            let explained = |t: &(usize, f64, f64, (f64, f64, f64))| {
-                let (asymmetry, limit) = (t.1 * t.2 * per_turn, t.3.2);
-                (t.3.1 - asymmetry).abs() < limit && limit < asymmetry.abs()
-            };
+            let pairs = forwards.0.min(backwards.0);
+            let per_turn = 0.5 * (forwards.1 - backwards.1);
+            let fewest = about
+                .iter()
+                .map(|one| one.turns)
+                .fold(f64::INFINITY, f64::min);
             let shows = per_turn.abs() * fewest > PUT_BACK * self.placement / pairs.sqrt();
-            if !(shows && about.iter().all(explained)) {
+            let explained = |one: &AboutAxis| {
+                let asymmetry = one.way * one.turns * per_turn;
+                (one.over - asymmetry).abs() < one.limit && one.limit < asymmetry.abs()
+            };
+            if pairs < 1.0 || !shows || !about.iter().all(explained) {
                 continue;
             }
-            for (k, way, whole, (part, ..)) in &about {
-                all[*k].0.asymmetry = way * whole * per_turn * part;
-                all[*k].1 = None;
+            for one in &about {
+                let (closure, refused) = &mut all[one.at];
+                closure.asymmetry = one.way * one.turns * per_turn * one.part;
+                *refused = None;
             }
             warnings.push(Warning::AsymmetricTurns {
                 axis: AXES[axis],
                 per_turn,
-                half,
+                half: self.placement / (fewest * (2.0 * pairs).sqrt()),
             });
         }
         warnings
