@@ -306,7 +306,8 @@ impl TriadPrior {
         each.collect()
     }
 
-    /// How far a fit with this prior has moved from the middle.
+    /// How far a fit with this prior has moved from the middle: all parameters together, and each by itself. Of twelve parameters together, one that is off by eight
+    /// standard deviations was not named in a third of the units.
     pub fn movement(&self, fitted: &Triad) -> Option<Movement> {
         let (values, parts) = fitted.physical_parts();
         let n = self.of.len();
@@ -320,17 +321,24 @@ impl TriadPrior {
         let l = self.factor.l_dirty();
         let white = l.solve_lower_triangular(&from)?;
         let half = l.solve_lower_triangular(&posterior)?;
-        let posterior = l.solve_lower_triangular(&half.transpose())?;
-        let moved = SymmetricEigen::new(DMatrix::identity(n, n) - posterior);
+        let decorrelated = l.solve_lower_triangular(&half.transpose())?;
+        let moved = SymmetricEigen::new(DMatrix::identity(n, n) - decorrelated);
         let seen = (0..n).filter(|k| moved.eigenvalues[*k] > SEEN);
         let squares =
             seen.map(|k| moved.eigenvectors.column(k).dot(&white).powi(2) / moved.eigenvalues[k]);
         let squares: Vec<f64> = squares.collect();
-        let p = self.beyond(squares.iter().sum(), squares.len() as f64);
+        let together = self.beyond(squares.iter().sum(), squares.len() as f64);
+        let each = (0..n).filter_map(|i| {
+            let prior = self.covariance[(i, i)];
+            let moved = prior - posterior[(i, i)];
+            (moved > SEEN * prior).then(|| self.beyond(from[i].powi(2) / moved, 1.0))
+        });
+        let each: Vec<f64> = each.collect();
+        let least = each.iter().copied().fold(1.0, f64::min) * each.len() as f64;
         let sigmas = |i: usize| from[i] / self.covariance[(i, i)].sqrt();
         let most = (0..n).max_by(|a, b| sigmas(*a).abs().total_cmp(&sigmas(*b).abs()))?;
         Some(Movement {
-            p,
+            p: (2.0 * together.min(least)).min(1.0),
             most: TriadParameter::physical()[self.of[most]],
             sigmas: sigmas(most),
         })

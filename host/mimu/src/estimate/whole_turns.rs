@@ -107,16 +107,16 @@ impl Stated {
         while at < turns.len() {
             let longest = (turns.len() - at).min(MOST_PARTS);
             let of = |parts: usize| self.whole(turns, at..at + parts, gyro, sigma);
-            let whole = (1..=longest).find_map(|parts| of(parts)?.ok());
+            let whole = (1..=longest).find_map(|parts| of(parts).filter(|found| found.1.is_none()));
             at = match whole {
-                Some(closure) => {
+                Some((closure, _)) => {
                     warnings.extend(self.miscounted(turns, &closure));
                     let after = closure.turns.end;
                     all.push((closure, None));
                     after
                 }
                 None => {
-                    all.extend(of(1).and_then(Result::err).map(|(c, why)| (c, Some(why))));
+                    all.extend(of(1));
                     at + 1
                 }
             };
@@ -216,7 +216,7 @@ impl Stated {
         range: std::ops::Range<usize>,
         gyro: &Affine<f64>,
         sigma: &dyn Fn(&Path, &ByTriad) -> f64,
-    ) -> Option<Result<Closure, (Closure, Warning)>> {
+    ) -> Option<(Closure, Option<Warning>)> {
         let turns = &all[range.clone()];
         let (first, last) = (turns.first()?, turns.last()?);
         let path = Path::of(turns, gyro);
@@ -235,10 +235,10 @@ impl Stated {
         };
         let turns = path.turns();
         match ended {
-            Ended::Whole => Some(Ok(closure)),
+            Ended::Whole => Some((closure, None)),
             Ended::Open(tilt) => {
                 let open = Warning::WholeTurnsOpen { from, to, turns };
-                (tilt < PUT_BACK * self.placement).then_some(Err((closure, open)))
+                (tilt < PUT_BACK * self.placement).then_some((closure, Some(open)))
             }
             // A turn of less than one and a half from pose to pose is no mistake.
             Ended::Off(off) => (turns > 1.5).then(|| {
@@ -248,7 +248,7 @@ impl Stated {
                     turns,
                     off,
                 };
-                Err((closure, off))
+                (closure, Some(off))
             }),
         }
     }
