@@ -239,16 +239,7 @@ fn fit_as_prepared(mut prepared: Prepared, options: Options) -> Result<Fit> {
         )
         .about(Argument::Only));
     }
-    let mut suspicions = Vec::new();
-    if prepared.manifest.trusts_readings() {
-        let found = prepared.dwells.fault.iter();
-        let found = found.chain(&prepared.condensed.signed_low_byte);
-        suspicions.extend(found.copied().map(Warning::Health));
-    } else if let Some(fault) = &prepared.dwells.fault {
-        return Err(fault.refusal(&prepared.place));
-    } else {
-        plausible::check_readings(&prepared)?;
-    }
+    let suspicions = suspicions(&prepared)?;
     reference_error::refuse_unused(&prepared, options.method)?;
     one_bias(&mut prepared);
     let mut with_all = PerSensor::default();
@@ -320,6 +311,22 @@ fn fit_as_prepared(mut prepared: Prepared, options: Options) -> Result<Fit> {
         changes,
         warnings,
     })
+}
+
+/// What is wrong with the readings of a recording that the user trusts.
+///
+/// # Errors
+/// The same, if the user does not.
+fn suspicions(prepared: &Prepared) -> Result<Vec<Warning>> {
+    if prepared.manifest.trusts_readings() {
+        let found = prepared.dwells.fault.iter();
+        let found = found.chain(&prepared.condensed.signed_low_byte);
+        return Ok(found.copied().map(Warning::Health).collect());
+    }
+    match &prepared.dwells.fault {
+        Some(fault) => Err(fault.refusal(&prepared.place)),
+        None => plausible::check_readings(prepared).map(|()| Vec::new()),
+    }
 }
 
 /// Moves what the accelerometer read before the last power-on to the bias of the last, if the poses determine both. The fit finds what remains of the
