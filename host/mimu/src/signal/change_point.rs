@@ -3,9 +3,6 @@
 //! The means of a second before and after each block are compared. What is usual for this difference is known from the recording itself:
 //! it contains the noise, whatever its colour, and the drift of a bias or of a hand over a second. A change of pose is far larger, and
 //! abrupt.
-//!
-//! A nudge leaves no change of level in a gyro: it turns the unit a little, and the readings before and after are those of the same bias. There the angle of half a second
-//! is compared with those around it.
 
 use std::ops::Range;
 
@@ -13,10 +10,6 @@ use crate::signal::blocks::{Condensed, pool, quantile};
 
 /// Least change of level, in robust standard deviations of the usual difference.
 const SIGMAS: f64 = 10.0;
-/// Least nudge, as a share of the fastest half seconds of a recording: 0.3 degrees where a hand turns by 130 deg/s. A hand that lays a unit down jerks by less.
-const LEAST: f64 = 5e-3;
-/// Least change of the angle of half a second, in robust standard deviations of the usual change, that is a nudge.
-const NUDGED: f64 = 6.0;
 /// Standard deviation of normal deviations over the lower quartile of their magnitudes. The median would not do: in two poses of 2.4 s, most
 /// of the differences contain the change between them.
 const OF_QUARTILE: f64 = 3.138;
@@ -42,62 +35,6 @@ pub(crate) fn split(
             from = at;
         }
         out.push(from..segment.end);
-    }
-    *segments = out;
-}
-
-/// Splits the segments of blocks where the unit was turned by more than the noise of `channels`, those of a gyro, explains; `width` blocks are a second.
-pub(crate) fn split_at_nudges(
-    segments: &mut Vec<Range<usize>>,
-    condensed: &Condensed,
-    channels: Range<usize>,
-    width: usize,
-) {
-    let length = (width / 2).max(1);
-    let usual = |changes: Vec<f64>| {
-        let mut sizes: Vec<f64> = changes.iter().map(|c| c.abs()).collect();
-        OF_QUARTILE * quantile(&mut sizes, 0.25).unwrap_or(0.0)
-    };
-    let recorded = channels.filter(|c| condensed.has_raw[*c]);
-    let channels: Vec<Channel> = recorded
-        .map(|c| {
-            let mut channel = Channel::of(segments, condensed, c, width);
-            let each = segments.iter();
-            channel.usual = usual(each.flat_map(|s| channel.turns(s, length)).collect());
-            let all = channel.turns(&(0..condensed.blocks.len()), length);
-            let mut all: Vec<f64> = all.iter().map(|c| c.abs()).collect();
-            let fastest = quantile(&mut all, 0.98).unwrap_or(0.0);
-            channel.usual = channel.usual.max(LEAST * fastest / NUDGED);
-            channel
-        })
-        .collect();
-    let mut out = Vec::with_capacity(segments.len());
-    let mut open: Vec<Range<usize>> = segments.drain(..).rev().collect();
-    while let Some(segment) = open.pop() {
-        let largest = channels.iter().filter_map(|channel| {
-            let turns = channel.turns(&segment, length);
-            // A hand trembles more in one rest than in another. A short rest is mostly nudge.
-            let own = match turns.len() < 6 * length {
-                true => 0.0,
-                false => usual(turns.clone()),
-            };
-            let limit = NUDGED * own.max(channel.usual);
-            let pairs = turns.iter().zip(turns.iter().skip(length));
-            // From the half second before to that after: a turn begins or ends a rest, and a nudge has one on either side.
-            let sizes = pairs.map(|(to, from)| match to * from < 0.0 {
-                true => to.abs().min(from.abs()) / limit,
-                false => 0.0,
-            });
-            let nudges = sizes.enumerate().filter(|(_, size)| *size > 1.0);
-            nudges.max_by(|a, b| a.1.total_cmp(&b.1))
-        });
-        match largest.max_by(|a, b| a.1.total_cmp(&b.1)) {
-            Some((i, _)) => {
-                let from = segment.start + i + length;
-                open.extend([from + length..segment.end, segment.start..from]);
-            }
-            None => out.push(segment),
-        }
     }
     *segments = out;
 }
@@ -131,15 +68,6 @@ impl Channel {
     fn usual(&self, blocks: impl Iterator<Item = usize>, width: usize) -> f64 {
         let mut sizes: Vec<f64> = blocks.map(|i| self.step(i, width).abs()).collect();
         OF_QUARTILE * quantile(&mut sizes, 0.25).unwrap_or(0.0)
-    }
-
-    /// How the sum of `length` blocks changes from each block of `segment` on to those that follow it.
-    fn turns(&self, segment: &Range<usize>, length: usize) -> Vec<f64> {
-        let last = (segment.end + 1).saturating_sub(2 * length);
-        let starts = segment.start..last.max(segment.start);
-        starts
-            .map(|i| self.step(i + length, length) * length as f64)
-            .collect()
     }
 
     /// Mean of the `width` blocks from `i` on, minus that of the `width` blocks before.

@@ -277,10 +277,6 @@ impl Search<'_> {
             Reference::Table => 0..0,
         };
         change_point::split(&mut segments, self.condensed, by_level, self.width);
-        if self.by_hand() {
-            let gyro = Sensor::Gyro.channels();
-            change_point::split_at_nudges(&mut segments, self.condensed, gyro, self.width);
-        }
         let trembles = self.trembles(&variance);
         let guarded = segments.into_iter().filter_map(|segment| {
             // At the ends of the recording there is no motion to guard against.
