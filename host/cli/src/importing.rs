@@ -407,6 +407,18 @@ fn low_rate(summary: &ImportSummary) -> Option<String> {
     })
 }
 
+fn unknown_unit(files: &[PathBuf]) -> Error {
+    let remedy = format!(
+        "say it: {} --units UNITS, which is count, V, or as g,deg/s",
+        typed(files)
+    );
+    Error::new(
+        files[0].display(),
+        "the unit of the readings is unknown",
+        remedy,
+    )
+}
+
 /// Makes the recording, and prints nothing. Returns the options that say everything as well.
 pub(crate) fn imported(mut args: ImportArgs) -> Result<(ImportSummary, ImportOptions)> {
     let (files, faces) = faces(&args)?;
@@ -443,17 +455,7 @@ pub(crate) fn imported(mut args: ImportArgs) -> Result<(ImportSummary, ImportOpt
         .or(chosen.as_ref().and_then(|chosen| chosen.raw_unit))
         .or(logs.then_some(RawUnit::Si))
         .or(looked.as_ref().and_then(|look| look.raw_unit))
-        .ok_or_else(|| {
-            let remedy = format!(
-                "say it: {} --units UNITS, which is count, V, or as g,deg/s",
-                typed(&files)
-            );
-            Error::new(
-                files[0].display(),
-                "the unit of the readings is unknown",
-                remedy,
-            )
-        })?;
+        .ok_or_else(|| unknown_unit(&files))?;
     if let Some(look) = &looked {
         take_look(&mut args, look, !faces.is_empty());
     }
