@@ -10,10 +10,10 @@ use serde::de::{DeserializeSeed, Deserializer, MapAccess, SeqAccess, Visitor};
 use super::time::calendar_time;
 
 /// Units as they stand alone in a cell, or behind a number.
-pub(crate) const UNITS: [&str; 32] = [
+pub(crate) const UNITS: [&str; 34] = [
     "s", "ms", "us", "µs", "ns", "g", "mg", "m/(s^2)", "m/s^2", "m/s2", "m/s²", "mps2", "deg/s",
     "dps", "°/s", "mdps", "rad/s", "deg", "°C", "C", "degC", "uT", "µT", "Gauss", "gauss", "V",
-    "counts", "count", "LSB", "raw", "Pa", "hPa",
+    "counts", "count", "LSB", "raw", "Pa", "hPa", "kPa", "mV",
 ];
 
 /// Name of the time that ESP-IDF and Teleplot write in ms.

@@ -287,7 +287,7 @@ mod tests {
     fn units_below_the_names_may_be_unknown_and_a_line_may_say_the_rate() {
         // As Consensys and an older Xsens program write them.
         let table = of(
-            "\"sep=;\"\nTime;LN_X;GSR;Gyro_X;Mag\nms;m/(s^2);kOhms;deg/s;local_flux;\n1.5;9.8;401.1;0.1;2;\n2;9.8;401;0.2;2;\n",
+            "\"sep=;\"\nTime;LN_X;GSR;Gyro_X;Mag;Cell\nms;m/(s^2);kOhms;deg/s;local_flux;mV;\n1.5;9.8;401.1;0.1;2;4139;\n2;9.8;401;0.2;2;4139;\n",
         );
         assert_eq!(table.names[..2], ["Time", "LN_X"]);
         assert_eq!(table.units[..4], ["ms", "m/(s^2)", "kOhms", "deg/s"]);
