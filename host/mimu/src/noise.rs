@@ -57,9 +57,6 @@ impl NoiseAtRest {
 pub struct ChannelNoise {
     /// The three terms fitted to the Allan variance.
     pub model: AllanModel,
-    /// A fourth one, that of a hand which trembles about one attitude: Allan variance of the rate times the square of the averaging time, raw²·s². The mean over a rest
-    /// is the difference of two angles, over its length.
-    pub tremor: f64,
     /// The Allan variance itself, (averaging time in s, raw units squared), if the model does not fit it: filtered noise, or a vibration.
     pub curve: Option<Vec<(f64, f64)>>,
     /// Whether any dwell has shown it. If none has, its variance is 0 and means nothing.
@@ -74,8 +71,7 @@ impl ChannelNoise {
     /// the curve continues with its last slope, limited to those of white noise and of a random walk.
     pub fn variance(&self, tau_s: f64) -> f64 {
         let Some(curve) = &self.curve else {
-            // An Allan variance has three differences of angles where a mean has two.
-            return self.model.variance(tau_s) + self.tremor / (1.5 * tau_s * tau_s);
+            return self.model.variance(tau_s);
         };
         let k = curve
             .partition_point(|p| p.0 < tau_s)

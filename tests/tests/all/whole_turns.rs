@@ -3,11 +3,9 @@
 use mimu::calibration::Calibration;
 use mimu::calibration::verify::verify;
 use mimu::fit::{Options, fit};
-use mimu::judgement::Judgement;
 use mimu::quantity::Sensor;
 use mimu::warning::Warning;
 use mimu_recording::WholeTurns;
-use mimu_rig::rig_file::EffectFile;
 use mimu_tests::by_hand::{Grade, unit};
 use mimu_tests::whole_turns::{Session, case, recorded, scales};
 use rayon::prelude::*;
@@ -170,61 +168,6 @@ fn a_unit_that_is_not_put_back_is_named_and_left_out() {
         let scales = scales(&fitted, &file, 4, &plan);
         assert!((0..3).all(|k| scales.errors[k].abs() < 5e-4), "{scales:?}");
     }
-}
-
-/// A gyro whose scale factors differ by half a per cent between the two ways: errors of ten turns of nine degrees.
-#[test]
-fn turns_that_read_more_one_way_are_named_and_used() {
-    let mut file = unit(&[], Grade::Consumer, 8);
-    let size = vec![toml::Value::Float(0.75); 3];
-    file.effect.push(EffectFile {
-        id: "gyro_scale_asymmetry".into(),
-        parameters: toml::Table::from_iter([("dps_at_300dps".to_owned(), size.into())]),
-    });
-    let plan = Session::POSES_AND_TURNS.plan();
-    let stated = Some(WholeTurns::default());
-    let made = recorded(&file, &plan, 8, stated);
-    let fitted = fit(made.clone(), Options::IN_SAMPLE).unwrap();
-    assert!(!Judgement::of_fit(&fitted).is_good());
-    let told: Vec<String> = fitted.all_warnings().map(ToString::to_string).collect();
-    let asymmetric = told.iter().filter(|w| w.contains("is asymmetric"));
-    assert_eq!(asymmetric.count(), 3, "{told:?}");
-    let scales = scales(&fitted, &file, 8, &plan);
-    for (error, half) in scales.errors.iter().zip(scales.half_widths) {
-        assert!(error.abs() < 1.5 * half && half < 5e-4, "{error} {half}");
-    }
-    let calibration = Calibration::of(&fitted, &[], "2026-01-02T03:04:05Z").unwrap();
-    for axis in &verify(&made, &calibration).unwrap().whole_turns {
-        let ways = axis.asymmetric().expect("turned both ways");
-        for ([error, half], truth) in ways.iter().zip([0.9, -0.9]) {
-            assert!(
-                (error - truth).abs() < 1.5 * half && *half < 0.15,
-                "{ways:?}"
-            );
-        }
-    }
-}
-
-/// Nine samples in every fifteen seconds.
-#[test]
-fn samples_that_are_lost_while_it_turns_widen_the_intervals_and_refuse_nothing() {
-    let inside = (30..40).into_par_iter().map(|seed| {
-        let mut file = unit(&[], Grade::Consumer, seed);
-        (file.flaws.pause_after, file.flaws.pause_s) = (3000, 0.045);
-        let plan = Session::POSES_AND_TURNS.plan();
-        let stated = Some(WholeTurns::default());
-        let fitted = fit(recorded(&file, &plan, seed, stated), Options::IN_SAMPLE).unwrap();
-        let refused = |w: &&Warning| matches!(w, Warning::TurnNotUsed { fault: None, .. });
-        let refused = fitted.warnings.iter().filter(refused).count();
-        let scales = scales(&fitted, &file, seed, &plan);
-        let widest = scales.half_widths.into_iter().fold(0.0, f64::max);
-        (refused, widest, scales.inside)
-    });
-    let all: Vec<(usize, f64, u32)> = inside.collect();
-    println!("{all:?}");
-    assert!(all.iter().all(|one| one.0 == 0), "{all:?}");
-    assert!(all.iter().all(|one| one.1 < 5e-4), "{all:?}");
-    assert!(all.iter().map(|one| one.2).sum::<u32>() >= 108, "{all:?}");
 }
 
 /// Somebody who stops eleven degrees short each time, with a gyro that is too noisy for a few poses to tell each turn.

@@ -68,24 +68,23 @@ impl Differences {
         }
     }
 
-    /// This variance of white noise, flicker floor and random walk of [`AllanModel`], and of a tremor, each with the coefficient 1.
+    /// This variance of white noise, flicker floor and random walk of [`AllanModel`], each with the coefficient 1.
     ///
     /// By Riley, Handbook of Frequency Stability Analysis (NIST SP 1065), the Hadamard variance of white noise equals the Allan variance.
-    /// For flicker noise it is ln(256/27)/2 where the Allan variance is 2 ln 2, for a random walk half the Allan variance, and for white angles 10/9 of it.
-    fn basis(self, tau_s: f64) -> [f64; 4] {
-        let of_angles = 1.0 / (tau_s * tau_s);
+    /// For flicker noise it is ln(256/27)/2 where the Allan variance is 2 ln 2, and for a random walk half the Allan variance.
+    fn basis(self, tau_s: f64) -> [f64; 3] {
         match self {
-            Self::Allan => [1.0 / tau_s, 1.0, tau_s, of_angles],
+            Self::Allan => [1.0 / tau_s, 1.0, tau_s],
             Self::Hadamard => {
                 let flicker = (256.0_f64 / 27.0).ln() / (4.0 * 2.0_f64.ln());
-                [1.0 / tau_s, flicker, 0.5 * tau_s, of_angles / 0.9]
+                [1.0 / tau_s, flicker, 0.5 * tau_s]
             }
         }
     }
 
-    fn of(self, terms: &[f64; 4], tau_s: f64) -> f64 {
-        let each = self.basis(tau_s).into_iter().zip(terms);
-        each.map(|(basis, term)| basis * term).sum()
+    fn of(self, model: &AllanModel, tau_s: f64) -> f64 {
+        let [white, flicker, walk] = self.basis(tau_s);
+        model.white * white + model.flicker * flicker + model.walk * walk
     }
 
     /// Sum of the squared differences of means over `m` blocks, each scaled to estimate the variance, and their number; `sums` are the
@@ -147,10 +146,10 @@ fn points(kind: Differences, all: &[Series], block_s: f64) -> Vec<Point> {
 pub(super) fn pooled(series: impl Iterator<Item = Series>, block_s: f64) -> ChannelNoise {
     let all: Vec<Series> = series.collect();
     let of_kinds = Differences::BOTH.map(|kind| points(kind, &all, block_s));
-    let terms = fit(&of_kinds.concat());
+    let model = fit(&of_kinds.concat());
     // A variance of n independent differences is known to √(2/n) of itself.
     let fits = |p: &Point| {
-        let expected = p.kind.of(&terms, p.tau_s);
+        let expected = p.kind.of(&model, p.tau_s);
         (p.variance / expected).ln().abs() <= MISFIT_SIGMAS * (2.0 / p.count).sqrt()
     };
     let misfit = of_kinds
@@ -169,15 +168,9 @@ pub(super) fn pooled(series: impl Iterator<Item = Series>, block_s: f64) -> Chan
         .filter(|p| p.count >= CURVE_DIFFERENCES && p.variance > 0.0)
         .map(|p| (p.tau_s, p.variance))
         .collect();
-    let [white, flicker, walk, tremor] = terms;
     ChannelNoise {
         known: all.iter().any(|s| s.means.len() > 1),
-        model: AllanModel {
-            white,
-            flicker,
-            walk,
-        },
-        tremor,
+        model,
         curve: (misfit && known.len() >= 2).then_some(known),
     }
 }
@@ -193,17 +186,17 @@ const SMALLEST: f64 = 1e-100;
 /// Least drop in deviance for another term: significant at 0.5 %.
 const TERM_DEVIANCE: f64 = 8.0;
 
-/// Fits the four terms to the points, none of them negative.
+/// Fits the three terms to the points, none of them negative.
 ///
 /// A variance of n differences is gamma distributed, and that likelihood is maximized (iterated least squares, weighted by the model).
-/// Weights by the measured variance would let one small value from two differences outweigh a hundred. With four terms every subset can be
+/// Weights by the measured variance would let one small value from two differences outweigh a hundred. With three terms every subset can be
 /// tried. A term that does not lower the deviance by [`TERM_DEVIANCE`] is left out. With every positive term included, the noise of the
 /// curve alone made the means of white noise a tenth too noisy (errors of 0.88 sigma instead of 1).
-fn fit(points: &[Point]) -> [f64; 4] {
+fn fit(points: &[Point]) -> AllanModel {
     let points: Vec<_> = points.iter().filter(|p| p.variance > SMALLEST).collect();
-    let mut best = (f64::INFINITY, [0.0; 4]);
-    for subset in 1..16usize {
-        let terms: Vec<usize> = (0..4).filter(|k| subset & (1 << k) != 0).collect();
+    let mut best = (f64::INFINITY, AllanModel::default());
+    for subset in 1..8usize {
+        let terms: Vec<usize> = (0..3).filter(|k| subset & (1 << k) != 0).collect();
         if terms.len() > points.len() {
             continue;
         }
@@ -250,11 +243,19 @@ fn fit(points: &[Point]) -> [f64; 4] {
             .sum();
         let cost = deviance + TERM_DEVIANCE * terms.len() as f64;
         if cost < best.0 {
-            let mut coefficients = [0.0; 4];
+            let mut coefficients = [0.0; 3];
             for (k, v) in terms.iter().zip(x.iter()) {
                 coefficients[*k] = *v;
             }
-            best = (cost, coefficients);
+            let [white, flicker, walk] = coefficients;
+            best = (
+                cost,
+                AllanModel {
+                    white,
+                    flicker,
+                    walk,
+                },
+            );
         }
     }
     best.1
@@ -281,7 +282,11 @@ mod tests {
             })
             .collect();
         let found = fit(&points);
-        for (a, b) in [truth.white, truth.flicker, truth.walk].iter().zip(found) {
+        for (a, b) in [
+            (truth.white, found.white),
+            (truth.flicker, found.flicker),
+            (truth.walk, found.walk),
+        ] {
             assert!((a / b - 1.0).abs() < 1e-9, "{found:?}");
         }
     }
@@ -298,23 +303,10 @@ mod tests {
             })
             .collect();
         let found = fit(&points);
-        assert!((found[0] / 4e-6 - 1.0).abs() < 1e-9, "{found:?}");
-        assert_eq!(found[1..], [0.0; 3]);
-    }
-
-    /// The rate of a hand whose angle scatters by one raw unit times 0.1 s: the mean over 20 s is off by the root of two of that, over 20 s.
-    #[test]
-    fn a_tremor_leaves_almost_no_mean() {
-        let mut state = 5;
-        let (mut before, root) = (0.0, 12f64.sqrt());
-        let mut next = || {
-            let angle = root * uniform(&mut state);
-            angle - std::mem::replace(&mut before, angle)
-        };
-        let found = pooled(series(false, 100, &mut next, 0.0).into_iter(), 0.1);
-        let truth = 2.0 * (0.1_f64 / 20.0).powi(2);
-        let ratio = found.variance(20.0) / truth;
-        assert!((0.8..1.6).contains(&ratio), "{ratio}: {found:?}");
+        assert!(
+            (found.white / 4e-6 - 1.0).abs() < 1e-9 && found.variance(100.0) < 4.1e-8,
+            "{found:?}"
+        );
     }
 
     /// Uniformly distributed over an interval of length 1, mean 0.
