@@ -37,7 +37,7 @@ pub struct Increment {
     pub coning: [f64; 3],
     /// d = 2 ∫ a(t) dt - T a(T), raw·s².
     pub moment: [f64; 3],
-    /// Variance of the integral by the samples that are lost, raw²·s², mean of the axes.
+    /// Variance of the integral about an axis by the samples that are lost, raw²·s².
     pub lost_variance: f64,
     /// Whether all samples are there and are numbers: false across a gap that is not [bridged](is_bridged).
     pub whole: bool,
@@ -106,7 +106,8 @@ impl Integrator {
             // The slope before would lead so far from the straight line: a third of that, times the interval, is what a parabola encloses with it.
             let slope = |k: usize| self.earlier.map_or(0.0, |e| (u0[k] - e[k]) / self.period_s);
             let enclosed = [0, 1, 2].map(|k| (u[k] - u0[k] - slope(k) * dt) * dt / 6.0);
-            open.lost_variance += enclosed.iter().map(|e| e * e).sum::<f64>() / 3.0;
+            // Three axes show its size: Student's distribution of three degrees of freedom has three times the variance of their mean square.
+            open.lost_variance += enclosed.iter().map(|e| e * e).sum::<f64>();
         }
         let earlier = self.earlier.filter(|_| regular);
         self.earlier = regular.then_some(u0);
