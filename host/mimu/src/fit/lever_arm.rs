@@ -99,7 +99,7 @@ pub(crate) fn without_arm(
     Some((out, warning))
 }
 
-/// The arm that all axes have in common, m, by least squares beside the biases.
+/// The arm that all axes have in common, m, by least squares beside the errors of C and o: what a wrong matrix does to turning dwells would else pass for an arm.
 fn arm(prepared: &Prepared, inverse: &Affine<f64>) -> Option<(Vector3<f64>, Warning)> {
     let list = &prepared.dwells.list;
     let observations = prepared.observations(Sensor::Accel);
@@ -108,22 +108,30 @@ fn arm(prepared: &Prepared, inverse: &Affine<f64>) -> Option<(Vector3<f64>, Warn
     if prepared.manifest.reference != Reference::Table || !both {
         return None;
     }
-    let mut normal = SMatrix::<f64, 6, 6>::zeros();
-    let mut right = SVector::<f64, 6>::zeros();
+    let mut normal = SMatrix::<f64, 15, 15>::zeros();
+    let mut right = SVector::<f64, 15>::zeros();
     let mut squares = 0.0;
     for o in &observations {
-        let mut by = SMatrix::<f64, 3, 6>::zeros();
+        let mut by = SMatrix::<f64, 3, 15>::zeros();
         by.fixed_columns_mut::<3>(0)
             .copy_from(&mean(&by_block(prepared, &list[o.dwell])));
         by.fixed_columns_mut::<3>(3).fill_with_identity();
+        for row in 0..3 {
+            let force = &o.input.transpose();
+            by.fixed_view_mut::<1, 3>(row, 6 + 3 * row).copy_from(force);
+        }
         let error = inverse.apply(&o.raw) - o.input;
         normal += by.transpose() * by;
         right += by.transpose() * error;
         squares += error.norm_squared();
     }
+    // What the forces do not show of C is as it was.
+    for k in 6..15 {
+        normal[(k, k)] += (TYPICAL_MPS2 / OF_MATRIX).powi(2);
+    }
     let covariance = normal.try_inverse()?;
     let found = covariance * right;
-    let residuals = 3 * observations.len() - 6;
+    let residuals = (3 * observations.len()).saturating_sub(15).max(1);
     let scatter = (squares - found.dot(&right)).max(0.0) / residuals as f64;
     let mm = |m: f64| 1e3 * m;
     let half = |i: usize| NORMAL_95 * (covariance[(i, i)] * scatter).sqrt();
@@ -133,3 +141,8 @@ fn arm(prepared: &Prepared, inverse: &Affine<f64>) -> Option<(Vector3<f64>, Warn
     };
     Some((found.fixed_rows::<3>(0).into_owned(), warning))
 }
+
+/// Error of a dwell on a table, m/s².
+const TYPICAL_MPS2: f64 = 3e-3;
+/// Change of an element of C from recording to recording, relative to its size: as much as between units.
+const OF_MATRIX: f64 = 0.02;
