@@ -201,20 +201,26 @@ pub fn fit_or_faces(prepared: Prepared, options: Options) -> Result<Fit> {
     }
 }
 
-/// Triads whose data contradict the `prior` that they were fitted with.
+/// Triads whose data contradict the `prior` that they were fitted with: each by itself, or else by poses and turns together. A gyro that does not belong would make
+/// the accelerometer seem not to.
 fn strangers(fitted: &Fit, prior: &Prior) -> Vec<(Sensor, Warning)> {
-    let each = fitted.sensors.iter().filter_map(|fit| {
-        let joint = with_priors(fitted, prior, fit.sensor);
-        let triad = joint.as_ref().unwrap_or(&fit.estimated.triad);
-        let moved = prior.triad(fit.sensor)?.movement(triad)?;
-        let warning = Warning::NotOfPopulation {
-            p: moved.p,
-            parameter: format!("{} {}", moved.most.0.words(), moved.most.axis()),
-            sigmas: moved.sigmas,
-        };
-        (moved.p < FALSE_STRANGER).then(|| (fit.sensor, warning.of(fit.sensor)))
-    });
-    each.collect()
+    let found = |triad: &dyn Fn(&SensorFit) -> Option<Triad>| -> Vec<(Sensor, Warning)> {
+        let each = fitted.sensors.iter().filter_map(|fit| {
+            let moved = prior.triad(fit.sensor)?.movement(&triad(fit)?)?;
+            let warning = Warning::NotOfPopulation {
+                p: moved.p,
+                parameter: format!("{} {}", moved.most.0.words(), moved.most.axis()),
+                sigmas: moved.sigmas,
+            };
+            (moved.p < FALSE_STRANGER).then(|| (fit.sensor, warning.of(fit.sensor)))
+        });
+        each.collect()
+    };
+    let alone = found(&|fit| Some(fit.estimated.triad.clone()));
+    match alone.is_empty() {
+        true => found(&|fit| with_priors(fitted, prior, fit.sensor)),
+        false => alone,
+    }
 }
 
 fn fit_as_prepared(mut prepared: Prepared, options: Options) -> Result<Fit> {

@@ -271,13 +271,6 @@ pub enum Warning {
         turns: f64,
         off: f64,
     },
-    /// Turns one way about an axis of the gyro that read more than those the other way: the difference from their mean and its half-width, rad for each turn.
-    #[error("{axis}: a turn of 360 deg forwards is read as {:.2}, one backwards as {:.2} ± {} deg: the gyro is asymmetric, which no scale factor describes; mimu diagnose names the effect", 360.0 + .per_turn.to_degrees(), 360.0 - .per_turn.to_degrees(), significant(.half.to_degrees()))]
-    AsymmetricTurns {
-        axis: &'static str,
-        per_turn: f64,
-        half: f64,
-    },
     /// The whole turns together contradict the turns between rests: rms of their errors by the latter, rad, and the probability of that.
     #[error("by the turns between rests, the whole turns end {} deg rms from where they began, which has a probability of {chance:.0e}: the unit was put back elsewhere each time, or the poses are wrong", significant(.off.to_degrees()))]
     WholeTurnsContradict { off: f64, chance: f64 },

@@ -458,7 +458,6 @@ mod tests {
             list: vec![Closure {
                 turns: 1..3,
                 path: Path::of(&turns[1..3], &gyro),
-                asymmetry: 0.0,
             }],
             ..Closures::default()
         };

@@ -15,7 +15,6 @@ use super::{Estimated, Failure};
 use crate::observation::ByTriad;
 use crate::observation::closure::{Closure, ClosureError, Closures};
 use crate::observation::turn::{Path, Turn};
-use crate::quantity::AXES;
 use crate::warning::Warning;
 
 /// Fewest turns of a whole turn: less is a turn from pose to pose.
@@ -43,8 +42,6 @@ const CLOSED: usize = 3;
 const OUTLYING: f64 = 5.0;
 /// Cosine of the largest angle between the axis of a whole turn and that of the unit that it counts for: 25 degrees.
 pub(crate) const NEAR_AXIS: f64 = 0.9;
-/// Largest error that an asymmetry leaves, in half-widths of the stated placement. One turn that ended off, and not an asymmetry, leaves half of its error.
-const EXPLAINED: f64 = 2.0;
 /// Probability from which on the whole turns contradict the turns between rests.
 const CONTRADICTED: f64 = 1e-4;
 
@@ -72,20 +69,6 @@ pub(crate) enum Ended {
     Open(f64),
 }
 
-/// Whole turns about an axis of the unit.
-struct AboutAxis {
-    /// Their place in the list.
-    at: usize,
-    /// 1 forwards, -1 backwards.
-    way: f64,
-    turns: f64,
-    /// The part of the direction up along their axis.
-    part: f64,
-    /// How much too far the gyro turns in them, rad, and the largest such error that the placement and the gyro allow.
-    over: f64,
-    limit: f64,
-}
-
 /// The whole turns found among the turns, and what is wrong with others.
 pub struct Found {
     /// Those that are used.
@@ -102,111 +85,34 @@ impl Stated {
         gyro: &Affine<f64>,
         sigma: &dyn Fn(&Path, &ByTriad) -> f64,
     ) -> Found {
-        let (mut all, mut warnings) = (Vec::new(), Vec::new());
-        let mut at = 0;
-        while at < turns.len() {
-            let longest = (turns.len() - at).min(MOST_PARTS);
-            let of = |parts: usize| self.whole(turns, at..at + parts, gyro, sigma);
-            let whole = (1..=longest).find_map(|parts| of(parts).filter(|found| found.1.is_none()));
-            at = match whole {
-                Some((closure, _)) => {
-                    warnings.extend(self.miscounted(turns, &closure));
-                    let after = closure.turns.end;
-                    all.push((closure, None));
-                    after
-                }
-                None => {
-                    all.extend(of(1));
-                    at + 1
-                }
-            };
-        }
-        warnings.extend(self.asymmetric(turns, gyro, sigma, &mut all));
-        let mut list = Vec::new();
-        for (closure, refused) in all {
-            match refused {
-                None => list.push(closure),
-                Some(why) => warnings.push(why),
-            }
-        }
-        Found {
+        let mut found = Found {
             closures: Closures {
-                list,
+                list: Vec::new(),
                 placement_variance: (self.placement / 1.96).powi(2),
                 vertical: self.vertical,
                 delivered: None,
             },
-            warnings,
-        }
-    }
-
-    /// Explains the whole turns about an axis of the unit that end off because the gyro reads more for a turn one way than for one the other: no bias does that,
-    /// because the rests show it, and somebody who puts the unit back badly errs alike both ways or at random. They are then used.
-    fn asymmetric(
-        &self,
-        turns: &[Turn],
-        gyro: &Affine<f64>,
-        sigma: &dyn Fn(&Path, &ByTriad) -> f64,
-        all: &mut [(Closure, Option<Warning>)],
-    ) -> Vec<Warning> {
-        let mut warnings = Vec::new();
-        for axis in 0..3 {
-            let about = all
-                .iter()
-                .enumerate()
-                .filter_map(|(at, (closure, refused))| {
-                    let along = closure.path.axis[axis];
-                    let open = matches!(refused, Some(Warning::WholeTurnsOpen { .. }));
-                    if open || along.abs() < NEAR_AXIS {
-                        return None;
-                    }
-                    let own = &turns[closure.turns.clone()];
-                    let (part, error) = closure.about_axis(own, gyro, self.vertical[0])?;
-                    let sigma = sigma(&closure.path, &error.block.by(0)) / part.abs();
-                    Some(AboutAxis {
-                        at,
-                        way: along.signum(),
-                        turns: closure.path.turns().round(),
-                        part,
-                        over: error.block.residual[0] / part,
-                        limit: EXPLAINED * self.placement + 3.0 * sigma,
-                    })
-                });
-            let about: Vec<AboutAxis> = about.collect();
-            let [forwards, backwards] = [1.0, -1.0].map(|way| {
-                let own = about.iter().filter(|one| one.way == way);
-                let count = own.clone().count() as f64;
-                (
-                    count,
-                    own.map(|one| one.over / one.turns).sum::<f64>() / count,
-                )
-            });
-            let pairs = forwards.0.min(backwards.0);
-            let per_turn = 0.5 * (forwards.1 - backwards.1);
-            let fewest = about
-                .iter()
-                .map(|one| one.turns)
-                .fold(f64::INFINITY, f64::min);
-            let shows = per_turn.abs() * fewest > PUT_BACK * self.placement / pairs.sqrt();
-            let explained = |one: &AboutAxis| {
-                let asymmetry = one.way * one.turns * per_turn;
-                (one.over - asymmetry).abs() < one.limit && one.limit < asymmetry.abs()
+            warnings: Vec::new(),
+        };
+        let mut at = 0;
+        while at < turns.len() {
+            let longest = (turns.len() - at).min(MOST_PARTS);
+            let of = |parts: usize| self.whole(turns, at..at + parts, gyro, sigma);
+            let whole = (1..=longest).find_map(|parts| of(parts)?.ok());
+            at = match whole {
+                Some(closure) => {
+                    found.warnings.extend(self.miscounted(turns, &closure));
+                    let after = closure.turns.end;
+                    found.closures.list.push(closure);
+                    after
+                }
+                None => {
+                    found.warnings.extend(of(1).and_then(Result::err));
+                    at + 1
+                }
             };
-            if pairs < 1.0 || !shows || !about.iter().all(explained) {
-                continue;
-            }
-            for one in &about {
-                let (closure, refused) = &mut all[one.at];
-                closure.asymmetry = one.way * one.turns * per_turn * one.part;
-                *refused = None;
-            }
-            warnings.push(Warning::AsymmetricTurns {
-                axis: AXES[axis],
-                per_turn,
-                half: self.placement / (fewest * (2.0 * pairs).sqrt()),
-            });
         }
-        warnings
+        found
     }
 
     /// Whether these neighbouring turns are whole: `None` if they are turns from pose to pose, the reason if they look whole and cannot be used.
@@ -216,7 +122,7 @@ impl Stated {
         range: std::ops::Range<usize>,
         gyro: &Affine<f64>,
         sigma: &dyn Fn(&Path, &ByTriad) -> f64,
-    ) -> Option<(Closure, Option<Warning>)> {
+    ) -> Option<Result<Closure, Warning>> {
         let turns = &all[range.clone()];
         let (first, last) = (turns.first()?, turns.last()?);
         let path = Path::of(turns, gyro);
@@ -228,28 +134,20 @@ impl Stated {
         }
         let ended = self.ended(turns, gyro, &|by| sigma(&path, by))?;
         let [from, to] = [first.steps[0], last.steps[1]];
-        let closure = Closure {
-            turns: range,
-            path,
-            asymmetry: 0.0,
-        };
-        let turns = path.turns();
         match ended {
-            Ended::Whole => Some((closure, None)),
+            Ended::Whole => Some(Ok(Closure { turns: range, path })),
             Ended::Open(tilt) => {
+                let turns = path.turns();
                 let open = Warning::WholeTurnsOpen { from, to, turns };
-                (tilt < PUT_BACK * self.placement).then_some((closure, Some(open)))
+                (tilt < PUT_BACK * self.placement).then_some(Err(open))
             }
             // A turn of less than one and a half from pose to pose is no mistake.
-            Ended::Off(off) => (turns > 1.5).then(|| {
-                let off = Warning::NotPutBack {
-                    from,
-                    to,
-                    turns,
-                    off,
-                };
-                (closure, Some(off))
-            }),
+            Ended::Off(off) => (path.turns() > 1.5).then_some(Err(Warning::NotPutBack {
+                from,
+                to,
+                turns: path.turns(),
+                off,
+            })),
         }
     }
 
@@ -448,7 +346,7 @@ fn outlying(turns: &[Turn], done: &Estimated, closures: &Closures) -> Option<(us
     let c2 = gyro.matrix.norm_squared() / 3.0;
     let errors = closures.list.iter().map(|closure| {
         let own = &turns[closure.turns.clone()];
-        let error = closure.unexplained(own, gyro, closures.vertical[0]);
+        let error = closure.error(own, gyro, closures.vertical[0]);
         (error, error * error / closures.variance(own, c2))
     });
     let errors: Vec<(f64, f64)> = errors.collect();
@@ -481,8 +379,7 @@ fn contradicted(
     let own = |closure: &Closure| &turns[closure.turns.clone()];
     let by = |gyro: &Affine<f64>| -> Vec<f64> {
         let each = list.iter();
-        each.map(|c| c.unexplained(own(c), gyro, vertical))
-            .collect()
+        each.map(|c| c.error(own(c), gyro, vertical)).collect()
     };
     let [before, after] = [base, done].map(|of| by(&of.triad.inverse));
     let c2 = done.triad.inverse.matrix.norm_squared() / 3.0;

@@ -491,7 +491,7 @@ impl<'a> State<'a> {
                 let (own, turned) = (&self.turns[turns()], &self.turned[turns()]);
                 if let Some(error) = ClosureError::of(own, turned, factors.vertical) {
                     let raw = [own[0].raw[0], own[own.len() - 1].raw[1]];
-                    rows.residuals(&[error.block.residual[0] - closure.asymmetry]);
+                    rows.residuals(error.block.residual.as_slice());
                     rows.by_triad(Sensor::Gyro, step, &error.block.by);
                     rows.by_triad(Sensor::Accel, step, &stacked(&[error.by_accel(&raw)]));
                 }

@@ -8,7 +8,8 @@
 use std::sync::Arc;
 
 use mimu_core::compensation::Affine;
-use nalgebra::{DMatrix, Matrix3, SMatrix, SVector, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use crate::estimate::Observation;
 use crate::prepared::Prepared;
@@ -99,7 +100,8 @@ pub(crate) fn without_arm(
     Some((out, warning))
 }
 
-/// The arm that all axes have in common, m, by least squares beside the errors of C and o: what a wrong matrix does to turning dwells would else pass for an arm.
+/// The arm that all axes have in common, m, by least squares beside the biases; with enough dwells also beside errors of C, because what a wrong matrix does to
+/// turning dwells would else pass for an arm. `None` if chance explains it: a few slow turns show an arm to some centimetres, and removing it would do harm.
 fn arm(prepared: &Prepared, inverse: &Affine<f64>) -> Option<(Vector3<f64>, Warning)> {
     let list = &prepared.dwells.list;
     let observations = prepared.observations(Sensor::Accel);
@@ -108,41 +110,40 @@ fn arm(prepared: &Prepared, inverse: &Affine<f64>) -> Option<(Vector3<f64>, Warn
     if prepared.manifest.reference != Reference::Table || !both {
         return None;
     }
-    let mut normal = SMatrix::<f64, 15, 15>::zeros();
-    let mut right = SVector::<f64, 15>::zeros();
-    let mut squares = 0.0;
-    for o in &observations {
-        let mut by = SMatrix::<f64, 3, 15>::zeros();
-        by.fixed_columns_mut::<3>(0)
-            .copy_from(&mean(&by_block(prepared, &list[o.dwell])));
-        by.fixed_columns_mut::<3>(3).fill_with_identity();
-        for row in 0..3 {
-            let force = &o.input.transpose();
-            by.fixed_view_mut::<1, 3>(row, 6 + 3 * row).copy_from(force);
-        }
+    let rows = 3 * observations.len();
+    let columns = if rows >= 2 * 15 { 15 } else { 6 };
+    let mut design = DMatrix::zeros(rows, columns);
+    let mut errors = DVector::zeros(rows);
+    for (i, o) in observations.iter().enumerate() {
+        let by_arm = mean(&by_block(prepared, &list[o.dwell]));
         let error = inverse.apply(&o.raw) - o.input;
-        normal += by.transpose() * by;
-        right += by.transpose() * error;
-        squares += error.norm_squared();
+        for axis in 0..3 {
+            let mut row = design.row_mut(3 * i + axis);
+            row.fixed_columns_mut::<3>(0).copy_from(&by_arm.row(axis));
+            row[3 + axis] = 1.0;
+            if columns > 6 {
+                row.fixed_columns_mut::<3>(6 + 3 * axis)
+                    .copy_from(&o.input.transpose());
+            }
+            errors[3 * i + axis] = error[axis];
+        }
     }
-    // What the forces do not show of C is as it was.
-    for k in 6..15 {
-        normal[(k, k)] += (TYPICAL_MPS2 / OF_MATRIX).powi(2);
+    let covariance = (design.transpose() * &design).try_inverse()?;
+    let found = &covariance * design.tr_mul(&errors);
+    let dof = rows.checked_sub(columns).filter(|dof| *dof > 0)? as f64;
+    let scatter = (&errors - design * &found).norm_squared() / dof;
+    let arm: Vector3<f64> = found.fixed_rows::<3>(0).into_owned();
+    let of_arm: Matrix3<f64> = covariance.fixed_view::<3, 3>(0, 0) * scatter;
+    let square = arm.dot(&(of_arm.try_inverse()? * arm)) / 3.0;
+    if FisherSnedecor::new(3.0, dof).ok()?.sf(square) > BY_CHANCE {
+        return None;
     }
-    let covariance = normal.try_inverse()?;
-    let found = covariance * right;
-    let residuals = (3 * observations.len()).saturating_sub(15).max(1);
-    let scatter = (squares - found.dot(&right)).max(0.0) / residuals as f64;
-    let mm = |m: f64| 1e3 * m;
-    let half = |i: usize| NORMAL_95 * (covariance[(i, i)] * scatter).sqrt();
     let warning = Warning::BesideAxis {
-        arm_mm: [0, 1, 2].map(|i| mm(found[i])),
-        interval_mm: [0, 1, 2].map(|i| mm(half(i))),
+        arm_mm: [0, 1, 2].map(|i| 1e3 * arm[i]),
+        interval_mm: [0, 1, 2].map(|i| 1e3 * NORMAL_95 * of_arm[(i, i)].sqrt()),
     };
-    Some((found.fixed_rows::<3>(0).into_owned(), warning))
+    Some((arm, warning))
 }
 
-/// Error of a dwell on a table, m/s².
-const TYPICAL_MPS2: f64 = 3e-3;
-/// Change of an element of C from recording to recording, relative to its size: as much as between units.
-const OF_MATRIX: f64 = 0.02;
+/// Probability of an arm by chance from which on it is one.
+const BY_CHANCE: f64 = 1e-3;

@@ -44,7 +44,6 @@ pub fn of_warning(warning: &Warning) -> Option<JudgementKind> {
         }
         | Warning::Worse { .. }
         | Warning::FaceDiffers { .. }
-        | Warning::AsymmetricTurns { .. }
         | Warning::WholeTurnsContradict { .. }
         | Warning::Outliers { .. } => Some(JudgementKind::Unexplained),
         _ => None,

@@ -11,9 +11,6 @@ use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 use super::turn::{Path, Turn, Turned, attitude_error};
 use super::{Block, ByTriad, place, slope};
 
-/// Sine of the least angle between the axis of whole turns and the level for which their heading shows how far they went.
-const LEVEL: f64 = 0.5;
-
 /// Neighbouring turns that together are whole: one, or several with rests between them.
 #[derive(Debug, Clone)]
 pub struct Closure {
@@ -21,8 +18,6 @@ pub struct Closure {
     pub turns: Range<usize>,
     /// How far the unit turned, by the calibration that they were found with.
     pub path: Path,
-    /// The part of its error that an asymmetry of the gyro explains, rad: turns one way read more than turns the other.
-    pub asymmetry: f64,
 }
 
 /// The whole turns among the turns of a recording, and what is known of where they end.
@@ -39,23 +34,10 @@ pub struct Closures {
 }
 
 impl Closure {
-    /// The error under the calibration `gyro` over its own `turns`, and the part of the direction up that lies along the axis of the turns: the error about that axis
-    /// is the first over the second. `None` for turns about a level axis, whose headings show nothing of them.
-    pub fn about_axis(
-        &self,
-        turns: &[Turn],
-        gyro: &Affine<f64>,
-        vertical: f64,
-    ) -> Option<(f64, ClosureError)> {
-        let error = ClosureError::at(turns, gyro, vertical)?;
-        let part = turns.last()?.after.normalize().dot(&self.path.axis);
-        (part.abs() > LEVEL).then_some((part, error))
-    }
-
-    /// The error of the heading, rad, without what an asymmetry explains.
-    pub fn unexplained(&self, turns: &[Turn], gyro: &Affine<f64>, vertical: f64) -> f64 {
+    /// The error of the heading over its own `turns`, rad, under the calibration `gyro`.
+    pub fn error(&self, turns: &[Turn], gyro: &Affine<f64>, vertical: f64) -> f64 {
         let error = ClosureError::at(turns, gyro, vertical);
-        error.map_or(0.0, |e| e.block.residual[0] - self.asymmetry)
+        error.map_or(0.0, |e| e.block.residual[0])
     }
 }
 

@@ -325,9 +325,7 @@ impl<'a> ByHand<'a> {
         // A turn that has not ended where it began beyond what the placement allows is none.
         let stated = builder.prepared.whole_turns();
         let found = stated.map(|stated| stated.find(&turns, &inverse, &|_, _| 0.0));
-        let mut whole = found.map(|found| found.closures).unwrap_or_default();
-        // It is an effect to find.
-        whole.list.iter_mut().for_each(|c| c.asymmetry = 0.0);
+        let whole = found.map(|found| found.closures).unwrap_or_default();
         factors.headings(&whole);
         let values = factors.values(&[(Sensor::Gyro, &inverse)]);
         Self {
