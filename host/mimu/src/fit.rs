@@ -188,7 +188,7 @@ pub fn fit(prepared: Prepared, options: Options) -> Result<Fit> {
     Ok(fitted)
 }
 
-/// As [`fit`]. What the recording leaves open stays at the values of data sheets, if these let the rest be fitted: [`partly`].
+/// As [`fit`]. What the recording leaves open stays at the values of data sheets, if these let the rest be fitted (`fit/partly.rs`).
 ///
 /// # Errors
 /// Those of [`fit`].
