@@ -18,7 +18,8 @@ use std::path::{Path, PathBuf};
 use mimu::diagnose::Verdict;
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{
-    Batch, ClockRate, Columns, Growing, MANIFEST_FILE, Manifest, Recording, Restart, SampleFormat,
+    Batch, ClockRate, Columns, Growing, MANIFEST_FILE, Manifest, Recorded, Recording, Restart,
+    SampleFormat,
 };
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -366,10 +367,14 @@ impl OpenRecording {
                 manifest.power_on_s = written.power_on_s;
                 let clocks = manifest.clock.into_iter().chain(written.clock);
                 manifest.clock = clocks.min_by(|a, b| a.half_width.total_cmp(&b.half_width));
-                if let (Some(now), Some(before)) = (&mut manifest.recorded, written.recorded) {
-                    now.restarts = before.restarts;
-                    now.missing += before.missing;
-                }
+                manifest.recorded = match (manifest.recorded, written.recorded) {
+                    (Some(now), Some(before)) => Some(Recorded {
+                        restarts: before.restarts,
+                        missing: now.missing + before.missing,
+                        ..now
+                    }),
+                    (now, before) => now.or(before),
+                };
                 let growing = Growing::resume(&directory, columns, rows, bytes)?;
                 let recording = Recording::open(&directory)?.with_written_times();
                 recording.for_each_batch(
@@ -426,9 +431,13 @@ impl OpenRecording {
 
     /// Records that the device restarted at this time of the recording, s.
     pub fn restarted(&mut self, t_s: f64, start: String) {
-        if let Some(recorded) = &mut self.manifest.recorded {
-            recorded.restarts.push(Restart { t_s, start });
-        }
+        // A board of another maker tells nothing else of itself.
+        let none = || Recorded {
+            tool: concat!("mimu ", env!("CARGO_PKG_VERSION")).into(),
+            ..Recorded::default()
+        };
+        let recorded = self.manifest.recorded.get_or_insert_with(none);
+        recorded.restarts.push(Restart { t_s, start });
     }
 
     /// Records how fast the clock of its times runs. Whoever reads it corrects them: on disk they stay as they came, so that a comparison over a longer time

@@ -305,6 +305,10 @@ impl UnitSession {
                 StationEvent::Back(unit) => {
                     let nameless = !unit.is_device;
                     self.lost_at = nameless.then_some(self.levels.len()).or(self.lost_at);
+                    if nameless {
+                        // Most boards have their supply from the same cable, and do not tell of a power-on.
+                        self.restarted = Some("the line came back".into());
+                    }
                     self.interrupted(Interruption::Back, tell)?;
                 }
             }
