@@ -112,7 +112,9 @@ fn main() -> ExitCode {
         [what, rest @ ..] if what.parse::<u64>().is_err() => match Trouble::named(what) {
             Some(trouble) => (Some(trouble), rest),
             None => {
-                eprintln!("clumsy: {what} is none of drift, clock, steps, swap, kills, population");
+                eprintln!(
+                    "clumsy: {what:?} is unknown; give drift, clock, steps, swap, kills or population"
+                );
                 return ExitCode::FAILURE;
             }
         },

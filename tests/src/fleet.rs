@@ -38,7 +38,7 @@ pub struct Drawn {
     pub truth: [[f64; 12]; 2],
 }
 
-/// What makes a unit none of the population: a parameter (of gyro or accelerometer, by its number among the twelve), and by how many standard deviations it is off.
+/// What sets a unit apart from the population: a parameter (of gyro or accelerometer, by its number among the twelve), and by how many standard deviations it is off.
 pub type Stranger = ([usize; 2], f64);
 /// A unit of the population.
 pub const OF_IT: Stranger = ([0; 2], 0.0);

@@ -201,7 +201,7 @@ pub fn fit_or_faces(prepared: Prepared, options: Options) -> Result<Fit> {
     }
 }
 
-/// Triads whose data contradict the `prior` that they were fitted with: each by itself, or else by poses and turns together. A gyro that does not belong would make
+/// Triads whose data contradict the `prior` that they were fitted with: each triad alone, or else poses and turns together. A gyro that does not belong would make
 /// the accelerometer seem not to.
 fn strangers(fitted: &Fit, prior: &Prior) -> Vec<(Sensor, Warning)> {
     let found = |triad: &dyn Fn(&SensorFit) -> Option<Triad>| -> Vec<(Sensor, Warning)> {

@@ -306,7 +306,7 @@ impl TriadPrior {
         each.collect()
     }
 
-    /// How far a fit with this prior has moved from the middle: all parameters together, and each by itself. Of twelve parameters together, one that is off by eight
+    /// How far a fit with this prior has moved from the middle: all parameters together, and each alone. Of twelve parameters together, one that is off by eight
     /// standard deviations was not named in a third of the units.
     pub fn movement(&self, fitted: &Triad) -> Option<Movement> {
         let (values, parts) = fitted.physical_parts();

@@ -56,7 +56,7 @@ fn restarts(manifest: &Manifest) -> Vec<f64> {
 }
 
 /// `condensed` with the gyro's readings before the last power-on moved by what their biases differ from the last, raw: otherwise dwells of one power-on seem
-/// to turn beside those of another. `find` finds the dwells of each power-on by itself. A few degrees an hour of the Earth's rate do not matter here: the fit
+/// to turn beside those of another. `find` finds the dwells of one power-on. A few degrees an hour of the Earth's rate do not matter here: the fit
 /// finds the rest.
 pub(crate) fn with_one_bias(
     mut condensed: Condensed,

@@ -26,7 +26,7 @@ const UNIT_RATIO: f64 = 10.0;
 const LEAST_TILT: f64 = 0.1;
 /// Turns of the direction of gravity after which they are compared, rad: less than a quarter turn, because in shaking hands no dwell may begin after it.
 const ENOUGH_TILT: f64 = 1.0;
-/// If this many consecutive turns, and more than half of all, lack samples or leave the gyro's range, this is no accident: the gyro cannot be calibrated this way.
+/// If this many consecutive turns, and more than half of all, lack samples or leave the gyro's range, the next ones will too: the gyro cannot be calibrated this way.
 const LOST_IN_A_ROW: u32 = 4;
 /// Change of the gyro's rates at rest that no power-on makes, rad/s (1 deg/s: low-cost parts change by some tenths), and in multiples of their scatter.
 const OTHER_UNIT: (f64, f64) = (0.0175, 6.0);
