@@ -67,7 +67,7 @@ impl TextDriver {
         Error::new(
             &self.place,
             problem,
-            "docs/wizard.md has all keys of a driver file",
+            "docs/wizard/driver.md has all keys of a driver file",
         )
     }
 
