@@ -116,7 +116,7 @@ fn the_defaults_of_table_hands_and_flaws_are_those_of_the_code() {
         for (keys, cells) in rows(&page, heading) {
             let key = &keys[0];
             if !defaults[key].is_table() {
-                assert_eq!(cells[1], format!("`{}`", defaults[key]), "{heading} {key}");
+                assert_eq!(cells[0], format!("`{}`", defaults[key]), "{heading} {key}");
             }
         }
     }
