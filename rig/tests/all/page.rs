@@ -116,7 +116,7 @@ fn the_defaults_of_table_hands_and_flaws_are_those_of_the_code() {
         for (keys, cells) in rows(&page, heading) {
             let key = &keys[0];
             if !defaults[key].is_table() {
-                assert_eq!(cells[1], format!("`{}`", defaults[key]), "{heading} {key}");
+                assert_eq!(cells[0], format!("`{}`", defaults[key]), "{heading} {key}");
             }
         }
     }
@@ -127,7 +127,7 @@ fn the_page_has_every_effect_with_its_parameters() {
     let documented: BTreeMap<_, _> = ["Known to estimators", "Unknown to estimators"]
         .into_iter()
         .flat_map(|heading| rows(&page(), heading))
-        .map(|(keys, cells)| (keys[0].clone(), cells))
+        .flat_map(|(keys, cells)| keys.into_iter().map(move |key| (key, cells.clone())))
         .collect();
     let expected: BTreeMap<_, _> = specs()
         .map(|spec| {
