@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
+use mimu_recording::ReadingUnits;
 use mimu_recording::error::{Argument, Error, Result};
-use mimu_recording::look::Given;
 use mimu_recording::{Column, Columns, InMemory, RawUnit};
 use numpy::ndarray::{Axis, Ix1};
 use numpy::{PyArray2, PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
@@ -281,9 +281,10 @@ pub(crate) fn units_of(
             Ok((unit.map_err(|error| raised(py, &error))?, [Some(1.0); 2]))
         }
         (None, Some(units)) => {
-            let given = Given::default().with_units(units);
-            let conversion = given.and_then(|given| given.conversion());
-            conversion.map_err(|error| raised(py, &error))
+            let units = units
+                .parse()
+                .and_then(|units: ReadingUnits| units.conversion());
+            units.map_err(|error| raised(py, &error))
         }
         (None, None) => Err(refused(
             "the unit of the readings is not given",

@@ -8,7 +8,7 @@ use mimu::signal::stillness::STILL_FACTOR;
 use mimu::triad::half_width_95;
 use mimu_core::compensation::Affine;
 use mimu_recording::error::Result;
-use mimu_recording::{ImportOptions, RawUnit, Recording, Reference, import};
+use mimu_recording::{ImportOptions, LogOptions, RawUnit, Recording, Reference, import};
 use nalgebra::{DMatrix, DVector, Matrix3, UnitQuaternion, Vector3};
 use tempfile::TempDir;
 
@@ -54,16 +54,17 @@ impl Foreign<'_> {
             std::fs::write(&path, text).expect("the temporary folder is writable");
             path
         });
-        let options = ImportOptions {
+        let mut options = ImportOptions::new(files, self.gravity_mps2, self.raw_unit, reference);
+        options.log = LogOptions {
             columns: columns.iter().map(|c| c.parse()).collect::<Result<_>>()?,
             rate_hz: self.rate_hz,
-            scales: self
+            scale: self
                 .scales
                 .iter()
                 .map(|s| s.parse())
                 .collect::<Result<_>>()?,
             inputs,
-            ..ImportOptions::new(files, self.gravity_mps2, self.raw_unit, reference)
+            ..LogOptions::default()
         };
         let out = folder.path().join("recording");
         for warning in import(&options, &out, |_| {})?.warnings {

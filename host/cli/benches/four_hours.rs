@@ -102,7 +102,7 @@ fn by_hand(folder: &Path) {
     }
     let mut options =
         ImportOptions::new(files.to_vec(), 9.81744, RawUnit::Count, Reference::Gravity);
-    options.columns = ["t_s,accel_x,accel_y,accel_z", "t_s,gyro_x,gyro_y,gyro_z"]
+    options.log.columns = ["t_s,accel_x,accel_y,accel_z", "t_s,gyro_x,gyro_y,gyro_z"]
         .map(|list| list.parse::<ColumnList>().expect("known columns"))
         .to_vec();
     options.replace = true;

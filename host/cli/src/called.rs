@@ -117,7 +117,7 @@ pub fn options(subcommand: &str) -> Vec<String> {
 /// Flags of the command that change what `error` is about, such as `--rate-hz`.
 pub fn flags(error: &Error) -> Vec<&'static str> {
     let arguments = &error.refused().arguments;
-    arguments.iter().filter_map(|a| hint::flag(*a)).collect()
+    arguments.iter().map(|a| a.flags()).collect()
 }
 
 /// The arguments `A` of the command `name`, but the files that it requires: the caller has their contents at hand.

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use clap::CommandFactory;
 use mimu::diagnose::rejected::{Reason, Rejected};
 use mimu::warning::Warning;
-use mimu_recording::error::{Argument, Error};
+use mimu_recording::error::Error;
 use mimu_recording::health::Fault;
 use mimu_thermal::warning::Warning as OverTemperature;
 use mimu_wizard::waiting::Waiting;
@@ -50,8 +50,7 @@ pub(crate) fn line(error: &Error, command: &clap::Command) -> String {
     };
     let flags: Vec<String> = arguments
         .iter()
-        .filter_map(|argument| flag(*argument))
-        .filter_map(named)
+        .filter_map(|argument| named(argument.flags()))
         .collect();
     match flags.is_empty() {
         true => error.to_string(),
@@ -92,85 +91,10 @@ pub(crate) fn of_rejected(rejected: &Rejected) -> String {
     }
 }
 
-pub(crate) fn flag(argument: Argument) -> Option<&'static str> {
-    Some(match argument {
-        Argument::Columns => "--columns",
-        Argument::SampleRate => "--rate-hz",
-        Argument::TimeUnit => "--time-unit",
-        Argument::Scale => "--scale",
-        Argument::Offset => "--offset",
-        Argument::Reference => "--reference",
-        Argument::TurntableRates => "--rate-dps",
-        Argument::TurntableRateError => "--rate-error",
-        Argument::WholeTurns => "--whole-turns and --placement",
-        Argument::Device => "--device",
-        Argument::StepsGiven => "--steps given",
-        Argument::StepsFound => "--steps found",
-        Argument::StillFactor => "--still",
-        Argument::AtRest => "--at-rest",
-        Argument::Method => "--method",
-        Argument::Only => "--only",
-        Argument::Stretch => "--from, --to",
-        Argument::Calibration => "--calibration",
-        Argument::Table => "--table",
-        Argument::Sensor => "--sensor",
-        Argument::Replace => "--replace",
-        Argument::Port => "--port",
-        Argument::OtherUnit => "--other-unit",
-        Argument::TrustClock => "--trust-clock",
-        Argument::Topic => "--topic",
-        Argument::Where => "--where",
-        Argument::Comment => "--comment",
-        Argument::Separator => "--separator",
-        Argument::TwosComplement => "--twos-complement",
-        Argument::Rows => "--rows",
-        Argument::Instance => "--instance",
-        Argument::Preset => "--preset",
-        Argument::Means => "--means",
-        Argument::SkipBroken => "--skip-broken",
-        Argument::TrustReadings => "--trust-readings",
-        Argument::SignedLowByte => "--signed-low-byte",
-        Argument::Accept => "--accept",
-        Argument::Force => "--force",
-        Argument::Base => "--base",
-        Argument::Estimator => "--estimator",
-        Argument::Range => "--range",
-        Argument::Curves => "--curves line",
-        Argument::SetPoints => "--points",
-        Argument::Soak => "--soak",
-        Argument::StepTimes => "--step-every",
-        Argument::RawUnit => "--raw-unit",
-        Argument::TextColumns => "--text",
-        Argument::Baud => "--baud",
-        Argument::Driver => "--driver",
-        Argument::Fixture => "--fixture",
-        Argument::Gravity => "--gravity",
-        Argument::Latitude => "--latitude",
-        Argument::DwellLength => "--dwell",
-        Argument::LargestRate => "--rate",
-        Argument::Plan => "--plan",
-        Argument::Seed => "--seed",
-        Argument::Drift => "--drift",
-        Argument::Prior => "--prior",
-        Argument::EstimatedBy => "--by",
-        Argument::Output => "-o",
-        Argument::Noise => "--noise",
-        Argument::GyroWalk => "--gyro-walk",
-        Argument::AccelWalk => "--accel-walk",
-        Argument::GyroConversion => "--gyro-si-per-raw",
-        Argument::AccelConversion => "--accel-si-per-raw",
-        Argument::GyroZero => "--gyro-zero",
-        Argument::AccelZero => "--accel-zero",
-        Argument::Prefix => "--prefix",
-        Argument::CalibrationOfNoise => "mimu allan --calibration",
-        // The command has no flag for this argument.
-        _ => return None,
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use mimu::quantity::Sensor;
+    use mimu_recording::error::Argument;
     use mimu_recording::health::Finding;
 
     use super::*;

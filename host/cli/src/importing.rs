@@ -3,17 +3,14 @@
 use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
 
-use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, CommandFactory};
 use mimu::quantity::normal_gravity;
 use mimu::warning::Warning;
-use mimu_recording::error::{Error, Result};
+use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::look::{Given, Look};
-use mimu_recording::signed_low_byte::SignedLowByte;
 use mimu_recording::{
-    BrokenLimit, Chosen, ColumnList, CommentSigns, Decimal, Face, ImportOptions, ImportSummary,
-    Offset, Preset, RawUnit, Reference, RowFilter, RowRange, SampleFormat, Scale, Separator,
-    Turntable, TurntableRate, TwosComplement, Zero, import, is_log, rate_error,
+    Chosen, Face, ImportOptions, ImportSummary, LogOptions, Preset, RawUnit, Reference,
+    SampleFormat, Scale, import, is_log,
 };
 
 use crate::Cli;
@@ -29,11 +26,11 @@ pub(crate) struct ImportArgs {
     #[command(flatten)]
     log: LogOptions,
     /// The files follow one another, like those of six faces: each is a dwell with the name of its file; one list of columns applies to all
-    #[arg(long, conflicts_with_all = ["means", "step_gap"])]
+    #[arg(long, conflicts_with_all = ["means", "step_gap_s"])]
     sequence: bool,
     /// One file for each face, named with the axis that was up: `--faces +x=a.csv -x=b.csv +y=c.csv -y=d.csv +z=e.csv -z=f.csv`; with
     /// --reference table the faces give the specific forces
-    #[arg(long, conflicts_with_all = ["means", "sequence", "inputs", "step_gap"])]
+    #[arg(long, conflicts_with_all = ["means", "sequence", "inputs", "step_gap_s"])]
     faces: bool,
     /// With --faces: the file with x down
     #[arg(short = 'x', value_name = "FILE", requires = "faces")]
@@ -55,130 +52,6 @@ pub(crate) struct ImportArgs {
     output: PathBuf,
     #[command(flatten)]
     pub(crate) json: JsonArgs,
-}
-
-/// What the person knows of a log: options of every command that takes one.
-#[derive(Args, Default, Clone)]
-pub(crate) struct LogOptions {
-    /// Columns of a file from the left (`t_s,accel_x,-`; `-` skips one), or by the names in its header (`gyro_x=wx,t_s=time`); one list for
-    /// each file, or several for a file with a sensor in other columns or rows (--where)
-    ///
-    /// Names of columns: t_s, step (numbers or labels), temp_c, gyro_x.., accel_x.., ref_rate_x_dps.., ref_force_x_mps2.., and sample, an
-    /// index that gives the time with --rate-hz.
-    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
-    columns: Vec<ColumnList>,
-    /// Maker or program whose columns, units and signs the files have [default: recognised by the header]
-    #[arg(long, value_name = "NAME", value_parser = presets())]
-    preset: Option<Preset>,
-    /// Each row is the mean over a pose or a rate, not a sample. Optional columns: standard deviation of a sample (`accel_x_sd`), number of
-    /// samples (`averaged`, `accel_x_averaged`), inputs (ref_ columns) and names (`step`)
-    #[arg(long)]
-    means: bool,
-    /// A pause of more than this number of seconds begins a new dwell, for files without rows between the poses
-    #[arg(
-        long,
-        value_name = "SECONDS",
-        allow_negative_numbers = true,
-        conflicts_with = "means"
-    )]
-    step_gap: Option<f64>,
-    /// Import only the rows in which a column has this value, for one of several sensors in a file: `channel=3`; if repeated, a row must
-    /// satisfy all, unless they are values of one column: then each belongs to a list of --columns
-    #[arg(long = "where", value_name = "COLUMN=VALUE", conflicts_with = "means")]
-    filters: Vec<RowFilter>,
-    /// Import only these data rows, the first and the last included, counted from 1: `..8799` for those before a fault in row 8800, `8800..`
-    #[arg(long, value_name = "FIRST..LAST", conflicts_with = "means")]
-    rows: Option<RowRange>,
-    /// Sample rate, Hz. Files without a time column need it; in others it checks the rate of the stamps, and decides if stamps in bursts
-    /// are ambiguous
-    #[arg(long, allow_negative_numbers = true)]
-    rate_hz: Option<f64>,
-    /// Unit of the time stamps: s, ms, us or ns [default: recognised; required if two are possible]
-    #[arg(long, value_name = "UNIT")]
-    time_unit: Option<Decimal>,
-    /// Local gravity, m/s² [default: normal gravity at sea level at --latitude, or 9.80665 with a warning]
-    #[arg(long, allow_negative_numbers = true)]
-    pub(crate) gravity: Option<f64>,
-    /// Unit of the raw columns, after --scale: V, count or SI (rad/s and m/s²) [default of bags, logs and most presets: SI]
-    #[arg(long, value_name = "UNIT")]
-    raw_unit: Option<RawUnit>,
-    /// Units of the readings in the file, which are converted to SI: one of g, mg, m/s2 and one of deg/s, mdeg/s, rad/s; or count, or V
-    /// [default: by the names, by gravity at rest and by its turns]
-    #[arg(long, value_name = "G,DEG/S", conflicts_with_all = ["raw_unit", "means"])]
-    units: Option<String>,
-    /// Topic of a bag (sensor_msgs/Imu; give two if gyro and accelerometer have one each) or of a PX4 log (sensor_gyro, sensor_combined,
-    /// vehicle_imu), or message of an ArduPilot log (IMU, GYR, IMT) [default: the only or the best one]
-    #[arg(long)]
-    topic: Vec<String>,
-    /// Sensor of a PX4 or ArduPilot log, counted from 0 [default: the only one]
-    #[arg(long, value_name = "N")]
-    instance: Option<u32>,
-    /// What is known of the input: table (ref_ columns or --inputs), gravity (its magnitude at rest), or turntable-rate (the magnitude of
-    /// the rate, as on a record player; needs --rate-dps and --rate-error) [default: gravity, unless there are ref_ columns, --inputs or
-    /// --rate-dps]
-    #[arg(long)]
-    reference: Option<Reference>,
-    /// Magnitudes of the turntable's rates, deg/s: 200 for 33 1/3 rpm, 270 for 45 rpm. The readings show which dwell has which rate, unless
-    /// it is given by number, label or file name (`edge=270`, `rest=0`)
-    #[arg(
-        long,
-        value_name = "RATE",
-        value_delimiter = ',',
-        requires = "rate_error",
-        allow_negative_numbers = true
-    )]
-    rate_dps: Vec<TurntableRate>,
-    /// Error of these rates: half of a 95 % interval, like `0.1%`; no number of dwells reduces it
-    #[arg(long, value_name = "PERCENT", requires = "rate_dps", value_parser = rate_error)]
-    rate_error: Option<f64>,
-    /// Factor for a column, or for gyro or accel: `gyro=0.0174533`
-    #[arg(long, value_name = "COLUMN=FACTOR")]
-    scale: Vec<Scale>,
-    /// Number added to a column after its factor: `temp_c=36.53`
-    #[arg(long, value_name = "COLUMN=VALUE", allow_hyphen_values = true)]
-    offset: Vec<Offset>,
-    /// Columns whose low byte the firmware read as a signed number: gyro, accel or a column; corrected exactly, before --scale
-    ///
-    /// `(high << 8) + (int8_t)low` is 256 counts too low if the low byte is 128 or more. The readings have to be whole counts.
-    #[arg(long, value_name = "COLUMN", conflicts_with = "means")]
-    signed_low_byte: Vec<SignedLowByte>,
-    /// Raw columns of unsigned codes in two's complement, with their bits: `accel=12`
-    #[arg(long, value_name = "COLUMN=BITS", conflicts_with = "means")]
-    twos_complement: Vec<TwosComplement>,
-    /// Code of raw columns at zero input, subtracted before --scale: `gyro=2048`
-    #[arg(long, value_name = "COLUMN=CODE", conflicts_with = "means")]
-    zero: Vec<Zero>,
-    /// Name of the unit; recordings and calibrations of units with different names are not used together [default: unnamed]
-    #[arg(long)]
-    device: Option<String>,
-    /// Latitude, degrees
-    #[arg(long, allow_negative_numbers = true)]
-    pub(crate) latitude: Option<f64>,
-    /// CSV file with the known input of each dwell or turn: step, ref_rate_x_dps.., ref_force_x_mps2.., turn_x_deg..
-    ///
-    /// One row for each number or label of the column step; leave unknown inputs empty: `step,turn_x_deg,ref_force_x_mps2`, then
-    /// `face_up,,9.81` and `about_x,360,`.
-    #[arg(long, value_name = "FILE")]
-    inputs: Option<PathBuf>,
-    /// Separator of text files: comma, semicolon, tab, whitespace, or all characters that separate cells: `,;*` [default: recognised]
-    #[arg(long)]
-    separator: Option<Separator>,
-    /// Characters that begin a comment line in text files, or none
-    #[arg(long, value_name = "SIGNS", default_value_t)]
-    comment: CommentSigns,
-    /// Leave out rows that cannot be read: at most this number (`=20`), or this share of each file (`=2%`) [without a value: 1%]
-    #[arg(long, value_name = "LIMIT", num_args = 0..=1, require_equals = true, default_missing_value = "1%", conflicts_with = "means")]
-    skip_broken: Option<BrokenLimit>,
-    /// Use the readings although they look like those of two devices in turn, wrongly coded, or of another range from some row on
-    #[arg(long, conflicts_with = "means")]
-    trust_readings: bool,
-}
-
-fn presets() -> impl TypedValueParser<Value = Preset> {
-    let names = Preset::all()
-        .iter()
-        .map(|preset| PossibleValue::new(preset.name).help(preset.title));
-    PossibleValuesParser::new(names).try_map(|name| name.parse::<Preset>())
 }
 
 /// Sample rates below this more likely mean a wrong unit of time.
@@ -248,39 +121,31 @@ fn look_at(args: &mut ImportArgs, files: &[PathBuf]) -> Result<Option<Look>> {
 fn ask(args: &mut ImportArgs, look: &Look) -> Result<bool> {
     let io = |error: std::io::Error| Error::io(Path::new("terminal"), &error);
     for question in &look.questions {
-        let (option, choice) = question
-            .answer
-            .split_once(' ')
-            .unwrap_or((&question.answer, ""));
+        let (setting, choice) = (question.setting, &question.value);
         eprintln!("{}", question.about);
-        eprint!("{option} ({choice}): ");
+        eprint!("{} ({choice}): ", setting.flags());
         let mut answer = String::new();
         std::io::stdin().read_line(&mut answer).map_err(io)?;
         let answer = answer.trim();
         if answer.is_empty() {
             return Ok(false);
         }
-        match option {
-            "--units" => {
-                let before = args
-                    .log
-                    .units
-                    .take()
-                    .map_or(String::new(), |units| units + ",");
-                args.log.units = Some(before + answer);
+        match setting {
+            Argument::Units => {
+                args.log.units = Some(args.log.units.unwrap_or_default().and(answer)?);
             }
-            "--rate-hz" => {
+            Argument::SampleRate => {
                 let number = answer.trim_end_matches("Hz").trim().parse();
                 let problem = format!("{answer:?} is no number");
                 let refused = |_| Error::new("--rate-hz", problem, "write samples a second");
                 args.log.rate_hz = Some(number.map_err(refused)?);
             }
-            "--columns" => {
+            Argument::Columns => {
                 args.log.columns.push(answer.parse()?);
                 let separator = look.files.iter().find_map(|file| file.separator);
                 args.log.separator = args.log.separator.or(separator);
             }
-            "--time-unit" => args.log.time_unit = Some(answer.parse()?),
+            Argument::TimeUnit => args.log.time_unit = Some(answer.parse()?),
             _ => return Ok(false),
         }
     }
@@ -308,16 +173,13 @@ fn look(args: &ImportArgs, files: &[PathBuf]) -> Result<Look> {
         || !args.log.zero.is_empty()
         || !args.log.signed_low_byte.is_empty();
     let scaled = args.log.scale.iter().any(Scale::is_of_readings);
-    let mut given = Given {
+    let given = Given {
+        units: args.log.units.unwrap_or_default(),
         // A factor may also come before the unit: twice the readings in deg/s.
         raw_unit: args.log.raw_unit.is_some() || converted || scaled && args.log.units.is_none(),
         rate: args.log.rate_hz.is_some(),
         time_unit: args.log.time_unit,
-        ..Given::default()
     };
-    if let Some(units) = &args.log.units {
-        given = given.with_units(units)?;
-    }
     // Files of a sequence are alike; joined ones are looked at together.
     let together = match args.sequence || args.faces {
         true => &files[..files.len().min(1)],
@@ -339,7 +201,7 @@ fn by_units(args: &mut ImportArgs, preset: Option<&Chosen>) -> Result<Option<Raw
         let remedy = "leave it out, or name the columns: --columns";
         return Err(Error::new("--units", problem, remedy));
     }
-    let (unit, factors) = Given::default().with_units(units)?.conversion()?;
+    let (unit, factors) = units.conversion()?;
     for (sensor, factor) in ["gyro", "accel"].into_iter().zip(factors) {
         if let Some(factor) = factor.filter(|factor| *factor != 1.0) {
             args.log.scale.push(format!("{sensor}={factor}").parse()?);
@@ -371,7 +233,7 @@ pub(crate) fn imported_log(
 
 /// Size of gravity, m/s², and what is said where it is assumed.
 fn gravity_of(args: &ImportArgs, reference: Reference) -> (f64, Option<String>) {
-    match (args.log.gravity, args.log.latitude) {
+    match (args.log.gravity_mps2, args.log.latitude_deg) {
         (Some(gravity), latitude) => {
             let off = latitude.and_then(|at| Warning::of_gravity(gravity, at));
             (gravity, off.map(|w| w.to_string()))
@@ -460,33 +322,9 @@ pub(crate) fn imported(mut args: ImportArgs) -> Result<(ImportSummary, ImportOpt
         take_look(&mut args, look, !faces.is_empty());
     }
     let options = ImportOptions {
-        topics: args.log.topic,
-        instance: args.log.instance,
-        twos_complements: args.log.twos_complement,
-        zeros: args.log.zero,
-        step_gap_s: args.log.step_gap,
-        turntable: args
-            .log
-            .rate_error
-            .map(|error| Turntable::new(&args.log.rate_dps, error)),
-        columns: args.log.columns,
-        separator: args.log.separator,
-        comments: args.log.comment,
-        rate_hz: args.log.rate_hz,
-        scales: args.log.scale,
-        offsets: args.log.offset,
-        signed_low_bytes: args.log.signed_low_byte,
-        time_unit: args.log.time_unit,
-        device: args.log.device,
-        latitude_deg: args.log.latitude,
-        inputs: args.log.inputs,
-        means: args.log.means,
+        log: args.log,
         sequence: args.sequence,
         faces,
-        filters: args.log.filters,
-        rows: args.log.rows,
-        skip_broken: args.log.skip_broken.unwrap_or_default(),
-        trust_readings: args.log.trust_readings,
         format: args.format,
         replace: args.replace,
         ..ImportOptions::new(files, gravity, raw_unit, reference)
@@ -498,7 +336,7 @@ pub(crate) fn imported(mut args: ImportArgs) -> Result<(ImportSummary, ImportOpt
     let inputs: Vec<&Path> = options
         .files
         .iter()
-        .chain(&options.inputs)
+        .chain(&options.log.inputs)
         .map(|p| p.as_path())
         .collect();
     check_outputs(&[args.json.file()], &inputs)?;

@@ -8,11 +8,11 @@ use clap::Args;
 use mimu::prepared::Prepared;
 use mimu::signal::stillness::DwellSearch;
 use mimu_recording::error::{Error, Result};
-use mimu_recording::{ImportOptions, MANIFEST_FILE, PoseMeans, Recording};
+use mimu_recording::{ImportOptions, LogOptions, MANIFEST_FILE, PoseMeans, Recording};
 use tempfile::TempDir;
 
 use crate::hint::LOG_IS_READ;
-use crate::importing::{LogOptions, imported_log};
+use crate::importing::imported_log;
 use crate::output::{check_outputs, progress};
 use crate::report;
 
@@ -30,8 +30,8 @@ impl LogArgs {
     /// With the gravity of a calibration that judges the log, unless the person knows a better one.
     pub(crate) fn or_gravity(&self, known: Option<f64>) -> Self {
         let mut with = self.clone();
-        if with.options.latitude.is_none() {
-            with.options.gravity = with.options.gravity.or(known);
+        if with.options.latitude_deg.is_none() {
+            with.options.gravity_mps2 = with.options.gravity_mps2.or(known);
         }
         with
     }

@@ -30,148 +30,97 @@ pub enum Error {
     Device(Refused),
 }
 
-/// A setting of the caller that an error may suggest to change.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Argument {
-    /// What each column contains.
-    Columns,
-    /// Samples a second.
-    SampleRate,
-    /// Unit of time stamps.
-    TimeUnit,
-    /// Factor of a column.
-    Scale,
-    /// What is added to a column.
-    Offset,
-    /// What is known of the true input.
-    Reference,
-    /// Name of the unit.
-    Device,
-    /// Use the dwells of the step column.
-    StepsGiven,
-    /// Find the dwells, and ignore the step column.
-    StepsFound,
-    /// Largest variance of a dwell.
-    StillFactor,
-    /// Whether the unit lies still throughout.
-    AtRest,
-    /// The estimator.
-    Method,
-    /// Which of the two sensors is calibrated.
-    Only,
-    /// Beginning and end of a time segment.
-    Stretch,
-    /// A calibration to convert readings by.
-    Calibration,
-    /// What carries the unit.
-    Table,
-    /// Sensor that an experiment is designed for.
-    Sensor,
-    /// Magnitudes of a turntable's rates.
-    TurntableRates,
-    /// Uncertainty of these rates.
-    TurntableRateError,
-    /// Turns by hand that end where they began.
-    WholeTurns,
-    /// Whether an existing result is replaced.
-    Replace,
-    /// Serial port.
-    Port,
-    /// Whether a calibration of another unit is stored.
-    OtherUnit,
-    /// Whether a clock is used although it differs from the computer's.
-    TrustClock,
-    /// Topic of a bag.
-    Topic,
-    /// Which of several sensors in a log.
-    Instance,
-    /// Which rows of a foreign file are read, by the value of a column.
-    Where,
-    /// Characters that begin a comment.
-    Comment,
-    /// What separates the cells of a text file.
-    Separator,
-    /// Columns of unsigned codes in two's complement.
-    TwosComplement,
-    /// The first and the last data row that are read.
-    Rows,
-    /// Software or device whose files are read.
-    Preset,
-    /// Whether rows are means instead of samples.
-    Means,
-    /// How many rows that cannot be read are left out.
-    SkipBroken,
-    /// Whether readings that look wrong are used.
-    TrustReadings,
-    /// Columns whose low byte a firmware took for a signed number.
-    SignedLowByte,
-    /// Products that are accepted on the evidence of one recording.
-    Accept,
-    /// Writing a calibration that is judged a misfit.
-    Force,
-    /// The calibration at one temperature that curves are added to.
-    Base,
-    /// The estimator of curves over temperature.
-    Estimator,
-    /// Temperatures that a plan covers.
-    Range,
-    /// Shape of curves over temperature.
-    Curves,
-    /// Set points of a soak.
-    SetPoints,
-    /// Time at a set point.
-    Soak,
-    /// When the dwells of a recording begin and end.
-    StepTimes,
-    /// Unit of the readings.
-    RawUnit,
-    /// Names of the numbers in a line of text.
-    TextColumns,
-    /// Bits a second of a serial port.
-    Baud,
-    /// What turns or warms the unit.
-    Driver,
-    /// What carries the unit.
-    Fixture,
-    /// Local gravity.
-    Gravity,
-    /// Latitude.
-    Latitude,
-    /// Length of a dwell.
-    DwellLength,
-    /// Largest rate of a table.
-    LargestRate,
-    /// The plan that dwells are taken from.
-    Plan,
-    /// Order of the planned dwells.
-    Seed,
-    /// Largest change of temperature during a session.
-    Drift,
-    /// The population that a unit is from.
-    Prior,
-    /// Whether the PC or the device estimates the calibration.
-    EstimatedBy,
-    /// Folder that is written.
-    Output,
-    /// The calibration that a noise file is made with.
-    CalibrationOfNoise,
-    /// Noise of the unit.
-    Noise,
-    /// Rate random walk of the gyro, if its noise file shows none.
-    GyroWalk,
-    /// The same for the accelerometer.
-    AccelWalk,
-    /// SI unit per raw unit by which a driver converts a gyro's readings.
-    GyroConversion,
-    /// The same for an accelerometer.
-    AccelConversion,
-    /// Raw reading that a driver converts to a rate of 0.
-    GyroZero,
-    /// Raw reading that a driver converts to a force of 0.
-    AccelZero,
-    /// Beginning of the names in a source file.
-    Prefix,
+/// Makes [`Argument`] from its list: name, flags of the command that set it, what it is.
+macro_rules! arguments {
+    ($($name:ident, $flags:literal, $what:literal;)*) => {
+        /// A setting of the caller that an error may suggest to change.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+        pub enum Argument {
+            $(#[doc = $what] $name,)*
+        }
+
+        impl Argument {
+            /// The flags of the command that set it, such as `--rate-hz`; of another command with its name, such as `mimu allan --calibration`.
+            pub fn flags(self) -> &'static str {
+                match self {
+                    $(Self::$name => $flags,)*
+                }
+            }
+        }
+    };
+}
+
+arguments! {
+    Columns, "--columns", "What each column contains.";
+    SampleRate, "--rate-hz", "Samples a second.";
+    TimeUnit, "--time-unit", "Unit of time stamps.";
+    Scale, "--scale", "Factor of a column.";
+    Offset, "--offset", "What is added to a column.";
+    Reference, "--reference", "What is known of the true input.";
+    Device, "--device", "Name of the unit.";
+    StepsGiven, "--steps given", "Use the dwells of the step column.";
+    StepsFound, "--steps found", "Find the dwells, and ignore the step column.";
+    StillFactor, "--still", "Largest variance of a dwell.";
+    AtRest, "--at-rest", "Whether the unit lies still throughout.";
+    Method, "--method", "The estimator.";
+    Only, "--only", "Which of the two sensors is calibrated.";
+    Stretch, "--from, --to", "Beginning and end of a time segment.";
+    Calibration, "--calibration", "A calibration to convert readings by.";
+    Table, "--table", "What carries the unit.";
+    Sensor, "--sensor", "Sensor that an experiment is designed for.";
+    TurntableRates, "--rate-dps", "Magnitudes of a turntable's rates.";
+    TurntableRateError, "--rate-error", "Uncertainty of these rates.";
+    WholeTurns, "--whole-turns and --placement", "Turns by hand that end where they began.";
+    Replace, "--replace", "Whether an existing result is replaced.";
+    Port, "--port", "Serial port.";
+    OtherUnit, "--other-unit", "Whether a calibration of another unit is stored.";
+    TrustClock, "--trust-clock", "Whether a clock is used although it differs from the computer's.";
+    Topic, "--topic", "Topic of a bag.";
+    Instance, "--instance", "Which of several sensors in a log.";
+    Where, "--where", "Which rows of a foreign file are read, by the value of a column.";
+    Comment, "--comment", "Characters that begin a comment.";
+    Separator, "--separator", "What separates the cells of a text file.";
+    TwosComplement, "--twos-complement", "Columns of unsigned codes in two's complement.";
+    Rows, "--rows", "The first and the last data row that are read.";
+    Preset, "--preset", "Software or device whose files are read.";
+    Means, "--means", "Whether rows are means instead of samples.";
+    SkipBroken, "--skip-broken", "How many rows that cannot be read are left out.";
+    TrustReadings, "--trust-readings", "Whether readings that look wrong are used.";
+    SignedLowByte, "--signed-low-byte", "Columns whose low byte a firmware took for a signed number.";
+    Accept, "--accept", "Products that are accepted on the evidence of one recording.";
+    Force, "--force", "Writing a calibration that is judged a misfit.";
+    Base, "--base", "The calibration at one temperature that curves are added to.";
+    Estimator, "--estimator", "The estimator of curves over temperature.";
+    Range, "--range", "Temperatures that a plan covers.";
+    Curves, "--curves line", "Shape of curves over temperature.";
+    SetPoints, "--points", "Set points of a soak.";
+    Soak, "--soak", "Time at a set point.";
+    StepTimes, "--step-every", "When the dwells of a recording begin and end.";
+    RawUnit, "--raw-unit", "Unit of the readings.";
+    Units, "--units", "Units of the readings in a file.";
+    TextColumns, "--text", "Names of the numbers in a line of text.";
+    Baud, "--baud", "Bits a second of a serial port.";
+    Driver, "--driver", "What turns or warms the unit.";
+    Fixture, "--fixture", "What carries the unit.";
+    Gravity, "--gravity", "Local gravity.";
+    Latitude, "--latitude", "Latitude.";
+    DwellLength, "--dwell", "Length of a dwell.";
+    LargestRate, "--rate", "Largest rate of a table.";
+    Plan, "--plan", "The plan that dwells are taken from.";
+    Seed, "--seed", "Order of the planned dwells.";
+    Drift, "--drift", "Largest change of temperature during a session.";
+    Prior, "--prior", "The population that a unit is from.";
+    EstimatedBy, "--by", "Whether the PC or the device estimates the calibration.";
+    Output, "-o", "Folder that is written.";
+    CalibrationOfNoise, "mimu allan --calibration", "The calibration that a noise file is made with.";
+    Noise, "--noise", "Noise of the unit.";
+    GyroWalk, "--gyro-walk", "Rate random walk of the gyro, if its noise file shows none.";
+    AccelWalk, "--accel-walk", "The same for the accelerometer.";
+    GyroConversion, "--gyro-si-per-raw", "SI unit per raw unit by which a driver converts a gyro's readings.";
+    AccelConversion, "--accel-si-per-raw", "The same for an accelerometer.";
+    GyroZero, "--gyro-zero", "Raw reading that a driver converts to a rate of 0.";
+    AccelZero, "--accel-zero", "Raw reading that a driver converts to a force of 0.";
+    Prefix, "--prefix", "Beginning of the names in a source file.";
 }
 
 /// Result with [`Error`].

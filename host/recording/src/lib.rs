@@ -59,9 +59,9 @@ pub use columns::{Column, Columns, RAW_COLUMNS, REFERENCE_COLUMNS};
 pub use growing::Growing;
 pub use import::{
     BrokenKind, BrokenLimit, BrokenRows, Chosen, ColumnList, CommentSigns, CopiedTable, Decimal,
-    Face, ImportOptions, ImportSummary, Inputs, Jitter, Offset, PoseMean, PoseMeans, Preset,
-    PresetUse, Preview, Role, Rounds, RowFilter, RowRange, Scale, SkippedLines, TimeSummary,
-    TwosComplement, Zero, import, is_log, labelled, look, preview,
+    Face, ImportOptions, ImportSummary, Inputs, Jitter, LogOptions, Offset, PoseMean, PoseMeans,
+    Preset, PresetUse, Preview, ReadingUnits, Role, Rounds, RowFilter, RowRange, Scale,
+    SkippedLines, TimeSummary, TwosComplement, Zero, import, is_log, labelled, look, preview,
 };
 pub use in_memory::{InMemory, usual_rate_hz};
 pub use manifest::{

@@ -86,22 +86,6 @@ impl Turntable {
         }
     }
 
-    /// The rates as arguments of an import.
-    pub(crate) fn arguments(&self) -> [(&'static str, String); 2] {
-        let steps = self.step_rates_dps.iter();
-        let steps = steps.map(|(step, dps)| format!("{step}={dps}"));
-        let rates = self.rates_dps.iter().map(f64::to_string);
-        let all: Vec<String> = rates.chain(steps).collect();
-        [
-            ("--rate-dps", all.join(",")),
-            // Rounded, so that a share of 0.001 is written as 0.1 % instead of 0.1000000001 %.
-            (
-                "--rate-error",
-                format!("{}%", (self.rate_error * 1e8).round() / 1e6),
-            ),
-        ]
-    }
-
     /// Checks the values; `place` names where they are, by key.
     pub(crate) fn check(&self, place: impl Fn(&str) -> String) -> Result<()> {
         let refuse = |key: &str, problem: String, remedy: &str| {
@@ -184,9 +168,6 @@ mod tests {
         assert_eq!(turntable.step_rates_dps["rest"], 0.0);
         assert_eq!(turntable.rate_error, 0.001);
         turntable.check(|key| key.to_owned()).unwrap();
-        let [rates_back, error_back] = turntable.arguments();
-        let again = Turntable::new(&rates(&rates_back.1), rate_error(&error_back.1).unwrap());
-        assert_eq!(again, turntable);
     }
 
     #[test]

@@ -48,7 +48,7 @@ impl Log {
         std::fs::write(&file, &self.text).expect("written");
         let list = "t_s,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z";
         let mut options = ImportOptions::new(vec![file], 9.81, RawUnit::Count, Reference::Gravity);
-        options.columns = vec![list.parse().expect("a list")];
+        options.log.columns = vec![list.parse().expect("a list")];
         with(&mut options);
         let summary: ImportSummary = import(&options, &out, |_| ())?;
         let mut t_s: Vec<f64> = Vec::new();
@@ -124,7 +124,7 @@ fn microseconds_of_a_log_at_one_or_two_hertz_are_asked_for_and_not_taken_for_nan
             "{said}"
         );
         let (time, t_s) = log
-            .import(|options| options.time_unit = Some("us".parse().expect("a unit")))
+            .import(|options| options.log.time_unit = Some("us".parse().expect("a unit")))
             .expect("importable");
         assert!((time.rate_hz / rate_hz - 1.0).abs() < 1e-3, "{time:?}");
         let lasts = log.taken_s[log.taken_s.len() - 1] - log.taken_s[0];

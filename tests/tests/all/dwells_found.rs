@@ -59,10 +59,8 @@ fn of_files(
     let folder = TempDir::new().expect("a folder");
     let paths = files.iter().map(|(path, _)| path.to_path_buf()).collect();
     let columns: Result<_> = files.iter().map(|(_, list)| list.parse()).collect();
-    let mut options = ImportOptions {
-        columns: columns?,
-        ..ImportOptions::new(paths, 9.80665, raw_unit, reference)
-    };
+    let mut options = ImportOptions::new(paths, 9.80665, raw_unit, reference);
+    options.log.columns = columns?;
     change(&mut options);
     let out = folder.path().join("recording");
     import(&options, &out, |_| ())?;
@@ -80,7 +78,7 @@ fn by_hand(
         raw_unit,
         Reference::Gravity,
         |options| {
-            options.rate_hz = rate_hz;
+            options.log.rate_hz = rate_hz;
         },
     )
 }
@@ -92,7 +90,7 @@ fn real_ones() {
             (data.join("xsens_gyro.mat"), "t_s,gyro_x,gyro_y,gyro_z"),
         ];
         let files = files.each_ref().map(|(path, list)| (path.as_path(), *list));
-        let rate = |options: &mut ImportOptions| options.rate_hz = Some(100.0);
+        let rate = |options: &mut ImportOptions| options.log.rate_hz = Some(100.0);
         line(
             "xsens",
             of_files(&files, RawUnit::Count, Reference::Gravity, rate),
@@ -145,9 +143,9 @@ fn real_ones() {
             RawUnit::Count,
             Reference::Gravity,
             |options| {
-                options.scales = vec!["temp_c=0.0029411765".parse().expect("a factor")];
-                options.offsets = vec!["temp_c=36.53".parse().expect("an offset")];
-                options.time_unit = Some("ms".parse().expect("a unit"));
+                options.log.scale = vec!["temp_c=0.0029411765".parse().expect("a factor")];
+                options.log.offset = vec!["temp_c=36.53".parse().expect("an offset")];
+                options.log.time_unit = Some("ms".parse().expect("a unit"));
             },
         );
         line("freeimu, warm-up", read);
@@ -161,7 +159,7 @@ fn real_ones() {
             ),
         ];
         let files = files.each_ref().map(|(path, list)| (path.as_path(), *list));
-        let rate = |options: &mut ImportOptions| options.rate_hz = Some(99.33);
+        let rate = |options: &mut ImportOptions| options.log.rate_hz = Some(99.33);
         line(
             "sunsided, rest",
             of_files(&files, RawUnit::Count, Reference::Gravity, rate),
@@ -174,7 +172,7 @@ fn real_ones() {
             RawUnit::Si,
             Reference::Gravity,
             |options| {
-                options.time_unit = Some("ms".parse().expect("a unit"));
+                options.log.time_unit = Some("ms".parse().expect("a unit"));
             },
         );
         line("pan, vacuum chamber", read);
@@ -214,9 +212,9 @@ fn cases() {
         .map(|path| (path.as_path(), "gyro_x,gyro_y,gyro_z"));
     let rates = ["rest=0", "33=200", "45=270"].map(|rate| rate.parse().expect("a rate"));
     let options = |options: &mut ImportOptions| {
-        options.rate_hz = Some(100.0);
+        options.log.rate_hz = Some(100.0);
         options.sequence = true;
-        options.turntable = Some(Turntable::new(&rates, 0.001));
+        (options.log.rate_dps, options.log.rate_error) = (rates.to_vec(), Some(0.001));
     };
     line(
         "record-player",
@@ -225,8 +223,9 @@ fn cases() {
     for (path, columns) in player {
         let name = path.file_stem().unwrap_or_default().to_string_lossy();
         let rate = |options: &mut ImportOptions| {
-            options.rate_hz = Some(100.0);
-            options.turntable = Some(Turntable::new(&["200".parse().expect("a rate")], 0.001));
+            options.log.rate_hz = Some(100.0);
+            options.log.rate_dps = vec!["200".parse().expect("a rate")];
+            options.log.rate_error = Some(0.001);
         };
         let read = of_files(
             &[(path, columns)],

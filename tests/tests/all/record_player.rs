@@ -198,18 +198,19 @@ fn rates_that_contradict_each_other_are_said_and_readings_in_si_tell_33_rpm_from
             Reference::TurntableRate,
         );
         let per_volt = 200f64.to_radians();
-        options.scales = vec![
+        options.log.scale = vec![
             format!("gyro={per_volt}").parse().expect("a scale"),
             "accel=12.5".parse().expect("a scale"),
         ];
-        options.offsets = ["x", "y", "z"]
+        options.log.offset = ["x", "y", "z"]
             .map(|axis| {
                 format!("gyro_{axis}={}", -2.5 * per_volt)
                     .parse()
                     .expect("an offset")
             })
             .into();
-        options.turntable = Some(turntable(rate, 0.001));
+        options.log.rate_dps = vec![rate.parse().expect("a rate")];
+        options.log.rate_error = Some(0.001);
         let out = folder.path().join(rate);
         import(&options, &out, |_| ()).expect("imported");
         let recording = Recording::open(&out).expect("a recording");

@@ -66,8 +66,8 @@ fn an_import_that_mends_the_low_byte_gives_the_calibration_of_the_same_unit_with
                 manifest.raw_unit,
                 manifest.reference,
             );
-            options.device = Some(manifest.device.clone());
-            options.signed_low_bytes = columns.iter().map(|c| c.parse().unwrap()).collect();
+            options.log.device = Some(manifest.device.clone());
+            options.log.signed_low_byte = columns.iter().map(|c| c.parse().unwrap()).collect();
             let out = folder.path().join("mended");
             import(&options, &out, |_| ()).expect("an import");
             let mended = Recording::open(&out).unwrap();

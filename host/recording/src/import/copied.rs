@@ -41,7 +41,7 @@ impl CopiedTable {
             let remedy = "write a recording instead: name a folder";
             Err(Error::new(path.display(), problem, remedy))
         };
-        if options.sources() != 1 || options.means || options.is_sequence() {
+        if options.sources() != 1 || options.log.means || options.is_sequence() {
             return refuse("only a single file is copied");
         }
         let import = JoinedFiles::open(options, LeftOut::default())?;

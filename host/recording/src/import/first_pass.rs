@@ -75,7 +75,10 @@ impl HowToRead<'_> {
             (false, None) => Some(1.0),
             (false, Some(_)) => None,
         };
-        let unit = self.time_unit.map(|unit| 1.0 / unit.per_second() as f64);
-        unit.or(Scale::given(self.scales, Column::Time)).or(own)
+        let unit = self
+            .log
+            .time_unit
+            .map(|unit| 1.0 / unit.per_second() as f64);
+        unit.or(Scale::given(&self.log.scale, Column::Time)).or(own)
     }
 }

@@ -4,51 +4,38 @@ use std::path::{Path, PathBuf};
 
 use super::SkippedLines;
 use super::assignment::{ColumnList, Offset, Role, Scale};
-use super::broken::{BrokenLimit, BrokenTally, Fault, Unreadable};
+use super::broken::{BrokenTally, Fault, Unreadable};
 use super::codes::{Conversion, TwosComplement, Zero};
-use super::comment_signs::TextFormat;
 use super::counter::{Counter, StampCounter};
 use super::log::{self, is_log};
+use super::options::LogOptions;
 use super::parquet_table::ParquetTable;
 use super::plausibility::Plausibility;
-use super::readings::{Choice, Readings};
+use super::readings::Readings;
 use super::row::Row;
 use super::row_filter::RowFilter;
 use super::row_range::RowRange;
 use super::step_labels::StepLabels;
 use super::text_table::{Cells, TextTable};
-use super::time::{Clock, Decimal, Stamp, Times};
+use super::time::{Clock, Stamp, Times};
 use crate::cell::{is_reading, no_reading, no_time};
 use crate::columns::Column;
 use crate::error::{Argument, Error, Result};
-use crate::signed_low_byte::SignedLowByte;
 
 /// How to read a foreign file.
 #[derive(Debug, Clone)]
 pub(super) struct HowToRead<'a> {
+    pub log: &'a LogOptions,
+    /// Columns of this source.
     pub list: Option<&'a ColumnList>,
-    pub format: TextFormat,
-    pub scales: &'a [Scale],
-    pub offsets: &'a [Offset],
-    pub signed_low_bytes: &'a [SignedLowByte],
-    pub twos_complements: &'a [TwosComplement],
-    pub zeros: &'a [Zero],
     /// Which rows are wanted.
     pub filters: Vec<RowFilter>,
     /// Which of these rows are wanted, by their numbers; all if `None`.
     pub rows: Option<RowRange>,
-    /// Which sensor of a log is wanted.
-    pub choice: Choice<'a>,
     /// Which of the readings of a log, counted from 0.
     pub part: usize,
     /// Sample rate, if given or known.
     pub rate_hz: Option<f64>,
-    /// Unit of the time stamps, if given.
-    pub time_unit: Option<Decimal>,
-    /// How many broken rows may be left out.
-    pub skip_broken: BrokenLimit,
-    /// Whether readings that look wrong are used.
-    pub trust_readings: bool,
     /// Whether a thermometer's cell with a zero is empty.
     pub empty_zero_temperatures: bool,
     /// Whether rows without a reading belong to another source of the same file.
@@ -58,12 +45,13 @@ pub(super) struct HowToRead<'a> {
 impl HowToRead<'_> {
     /// Conversion of the cells of `column`.
     fn conversion(&self, column: Column) -> Conversion {
+        let log = self.log;
         Conversion {
-            twos_complement: TwosComplement::bits(self.twos_complements, column),
-            signed_low_byte: self.signed_low_bytes.iter().any(|s| s.applies_to(column)),
-            zero: Zero::of(self.zeros, column),
-            factor: Scale::product(self.scales, column),
-            offset: Offset::sum(self.offsets, column),
+            twos_complement: TwosComplement::bits(&log.twos_complement, column),
+            signed_low_byte: log.signed_low_byte.iter().any(|s| s.applies_to(column)),
+            zero: Zero::of(&log.zero, column),
+            factor: Scale::product(&log.scale, column),
+            offset: Offset::sum(&log.offset, column),
         }
     }
 }
@@ -192,7 +180,7 @@ impl ForeignFile {
         fits_log(path, how)?;
         let table = match parquet {
             _ if is_log(path) => {
-                let mut all = log::read(path, how.choice)?;
+                let mut all = log::read(path, how.log.choice())?;
                 parts = all.len();
                 Table::Log(all.swap_remove(how.part))
             }
@@ -200,7 +188,7 @@ impl ForeignFile {
             false => Table::Text(Box::new(TextTable::open(
                 path,
                 how.list,
-                how.format,
+                how.log.text_format(),
                 &how.filters,
             )?)),
         };
@@ -227,7 +215,10 @@ impl ForeignFile {
         let values: Vec<Cell> = numbers.collect();
         Ok(ForeignFile {
             path: path.to_owned(),
-            seen: Plausibility::new(values.iter().map(|cell| cell.column), how.trust_readings),
+            seen: Plausibility::new(
+                values.iter().map(|cell| cell.column),
+                how.log.trust_readings,
+            ),
             values,
             empty_zero_temperatures: how.empty_zero_temperatures,
             skip_empty: how.skip_empty,
@@ -241,7 +232,7 @@ impl ForeignFile {
             clock: None,
             before: Row::default(),
             labels: StepLabels::default(),
-            broken: BrokenTally::new(how.skip_broken),
+            broken: BrokenTally::new(how.log.skip_broken.unwrap_or_default()),
             rows: how.rows,
             outside: 0,
         })

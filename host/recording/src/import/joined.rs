@@ -67,13 +67,16 @@ impl<'a> Opening<'a> {
         };
         if !opening.first.has_time() {
             // Opening has refused this already: without a time column the rate is needed.
-            opening.rate_hz = options.rate_hz.ok_or_else(|| {
+            opening.rate_hz = options.log.rate_hz.ok_or_else(|| {
                 Error::new("import", "the rate is unknown", "give it").about(Argument::SampleRate)
             })?;
             return Ok(opening);
         }
-        let times = first_pass::times(options.file(0), &how, options.rate_hz, None)?;
-        let warning = options.rate_hz.and_then(|given| other_rate(&times, given));
+        let times = first_pass::times(options.file(0), &how, options.log.rate_hz, None)?;
+        let warning = options
+            .log
+            .rate_hz
+            .and_then(|given| other_rate(&times, given));
         opening.rate_hz = times.summary.rate_hz;
         opening.warnings.extend(warning);
         opening.time.push(times.summary.clone());
@@ -99,7 +102,7 @@ impl<'a> Opening<'a> {
     fn follow(&mut self, source: usize, part: usize) -> Result<usize> {
         let path = self.options.file(source);
         let how = HowToRead {
-            rate_hz: self.options.rate_hz.or(Some(self.rate_hz)),
+            rate_hz: self.options.log.rate_hz.or(Some(self.rate_hz)),
             part,
             ..how(self.options, self.left_out, source)
         };
@@ -114,7 +117,7 @@ impl<'a> Opening<'a> {
         if file.has_time() {
             // Another sensor has its own rate and delays, but the times of both come from one clock.
             let first = self.first_times.as_ref();
-            let times = first_pass::times(path, &how, self.options.rate_hz, first)?;
+            let times = first_pass::times(path, &how, self.options.log.rate_hz, first)?;
             period_s = times.period_s();
             self.time.push(times.summary.clone());
             file = file.with_times(times);
@@ -135,7 +138,7 @@ impl<'a> Opening<'a> {
 
     /// Whether the rows of the recording belong to numbered steps.
     fn has_steps(&self) -> bool {
-        self.first.has_step() || self.options.is_sequence() || self.options.step_gap_s.is_some()
+        self.first.has_step() || self.options.is_sequence() || self.options.log.step_gap_s.is_some()
     }
 
     /// Columns of the recording: those of the files that are not left out, the step, and those of `inputs`.
@@ -147,7 +150,7 @@ impl<'a> Opening<'a> {
         };
         let mut names: Vec<&str> = vec![Column::Time.name()];
         names.extend(self.columns().filter(kept).map(|column| column.name()));
-        if self.options.step_gap_s.is_some() && self.first.has_step() {
+        if self.options.log.step_gap_s.is_some() && self.first.has_step() {
             let problem = "it has a column step, but the dwells are to be separated by pauses";
             let remedy = "skip the column, or leave out the pause";
             let place = self.first.path().display();
@@ -168,7 +171,7 @@ impl<'a> Opening<'a> {
     /// Refuses a table of inputs whose steps the files do not number.
     fn check_inputs(&self, inputs: Option<&StepInputs>) -> Result<()> {
         let problem = match inputs {
-            Some(inputs) if self.options.step_gap_s.is_some() && inputs.has_turns() => {
+            Some(inputs) if self.options.log.step_gap_s.is_some() && inputs.has_turns() => {
                 "the table of inputs has angles of turns, but pauses do not separate turns"
             }
             Some(_) if !self.has_steps() => "a table of inputs is given, but no column is step",
@@ -253,7 +256,7 @@ impl JoinedFiles {
             first: files.first,
             resampler,
             place: None,
-            step_gap_s: options.step_gap_s,
+            step_gap_s: options.log.step_gap_s,
             followers: files.followers,
             one_file: options.has_one_file_for_all(),
         })
@@ -273,8 +276,8 @@ impl JoinedFiles {
             options.raw_unit,
             options.reference,
         );
-        manifest.latitude_deg = options.latitude_deg;
-        manifest.turntable = options.turntable.clone();
+        manifest.latitude_deg = options.log.latitude_deg;
+        manifest.turntable = options.log.turntable().clone();
         manifest.imported_with = options.arguments();
         manifest
     }

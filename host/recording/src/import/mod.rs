@@ -27,6 +27,7 @@ mod pose_means;
 mod preset;
 mod preview;
 mod px4;
+mod reading_units;
 mod readings;
 mod resample;
 #[cfg(feature = "bags")]
@@ -67,10 +68,11 @@ pub use copied::CopiedTable;
 pub use faces::Face;
 pub use inputs::Inputs;
 pub use log::is_log;
-pub use options::ImportOptions;
+pub use options::{ImportOptions, LogOptions};
 pub use pose_means::{PoseMean, PoseMeans};
 pub use preset::{Chosen, Preset, PresetUse};
 pub use preview::{Preview, preview};
+pub use reading_units::ReadingUnits;
 pub use row_filter::RowFilter;
 pub use row_range::RowRange;
 pub use summary::{ImportSummary, SkippedLines};
@@ -91,7 +93,7 @@ pub fn import(
     progress: impl Fn(f64),
 ) -> Result<ImportSummary> {
     options.check(out)?;
-    if options.means {
+    if options.log.means {
         return pose_means::import_means(options, out);
     }
     if options.is_sequence() {
@@ -118,7 +120,7 @@ fn import_joined(
         return Ok(Err(dead));
     }
     import.finish_summary(writer.rows(), &manifest)?;
-    for file in options.files.iter().chain(&options.inputs) {
+    for file in options.files.iter().chain(&options.log.inputs) {
         manifest.sources.push(source(file)?);
     }
     if let Some(inputs) = &import.inputs {

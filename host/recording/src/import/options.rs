@@ -1,5 +1,6 @@
-//! What to import and how.
+//! What is known of a log, and what to import and how.
 
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
 use super::assignment::{ColumnList, Offset, Scale};
@@ -8,7 +9,8 @@ use super::codes::{TwosComplement, Zero};
 use super::comment_signs::{CommentSigns, TextFormat};
 use super::faces::Face;
 use super::foreign::HowToRead;
-use super::preset::{Chosen, PresetUse};
+use super::preset::{Chosen, Preset, PresetUse};
+use super::reading_units::ReadingUnits;
 use super::readings::Choice;
 use super::row_filter::RowFilter;
 use super::row_range::RowRange;
@@ -18,71 +20,302 @@ use crate::error::{Argument, Error, Result};
 use crate::manifest::{RawUnit, Reference, Source, TRUST_READINGS, check_gravity, check_rate};
 use crate::separator::Separator;
 use crate::signed_low_byte::SignedLowByte;
-use crate::turntable::Turntable;
+use crate::turntable::{Turntable, TurntableRate};
 use crate::unit_name::UNNAMED;
 use crate::writer::SampleFormat;
+
+/// What a person knows of a log, by hand or from a look at it: the options of every command that takes one, with the words of its help.
+#[derive(Debug, Clone, Default)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
+pub struct LogOptions {
+    /// Columns of a file from the left (`t_s,accel_x,-`; `-` skips one), or by the names in its header (`gyro_x=wx,t_s=time`); one list for
+    /// each file, or several for a file with a sensor in other columns or rows (--where)
+    ///
+    /// Names of columns: t_s, step (numbers or labels), temp_c, gyro_x.., accel_x.., ref_rate_x_dps.., ref_force_x_mps2.., and sample, an
+    /// index that gives the time with --rate-hz.
+    #[cfg_attr(
+        feature = "clap",
+        arg(long, value_name = "LIST", allow_hyphen_values = true)
+    )]
+    pub columns: Vec<ColumnList>,
+    /// Maker or program whose columns, units and signs the files have [default: recognised by the header]
+    #[cfg_attr(feature = "clap", arg(long, value_name = "NAME", value_parser = presets()))]
+    pub preset: Option<Preset>,
+    /// Each row is the mean over a pose or a rate, not a sample. Optional columns: standard deviation of a sample (`accel_x_sd`), number of
+    /// samples (`averaged`, `accel_x_averaged`), inputs (ref_ columns) and names (`step`)
+    #[cfg_attr(feature = "clap", arg(long))]
+    pub means: bool,
+    /// A pause of more than this number of seconds begins a new dwell, for files without rows between the poses
+    #[cfg_attr(
+        feature = "clap",
+        arg(
+            long = "step-gap",
+            value_name = "SECONDS",
+            allow_negative_numbers = true,
+            conflicts_with = "means"
+        )
+    )]
+    pub step_gap_s: Option<f64>,
+    /// Import only the rows in which a column has this value, for one of several sensors in a file: `channel=3`; if repeated, a row must
+    /// satisfy all, unless they are values of one column: then each belongs to a list of --columns
+    #[cfg_attr(
+        feature = "clap",
+        arg(long = "where", value_name = "COLUMN=VALUE", conflicts_with = "means")
+    )]
+    pub filters: Vec<RowFilter>,
+    /// Import only these data rows, the first and the last included, counted from 1: `..8799` for those before a fault in row 8800, `8800..`
+    #[cfg_attr(
+        feature = "clap",
+        arg(long, value_name = "FIRST..LAST", conflicts_with = "means")
+    )]
+    pub rows: Option<RowRange>,
+    /// Sample rate, Hz. Files without a time column need it; in others it checks the rate of the stamps, and decides if stamps in bursts
+    /// are ambiguous
+    #[cfg_attr(feature = "clap", arg(long, allow_negative_numbers = true))]
+    pub rate_hz: Option<f64>,
+    /// Unit of the time stamps: s, ms, us or ns [default: recognised; required if two are possible]
+    #[cfg_attr(feature = "clap", arg(long, value_name = "UNIT"))]
+    pub time_unit: Option<Decimal>,
+    /// Local gravity, m/s² [default: normal gravity at sea level at --latitude, or 9.80665 with a warning]
+    #[cfg_attr(
+        feature = "clap",
+        arg(
+            long = "gravity",
+            value_name = "GRAVITY",
+            allow_negative_numbers = true
+        )
+    )]
+    pub gravity_mps2: Option<f64>,
+    /// Unit of the raw columns, after --scale: V, count or SI (rad/s and m/s²) [default of bags, logs and most presets: SI]
+    #[cfg_attr(feature = "clap", arg(long, value_name = "UNIT"))]
+    pub raw_unit: Option<RawUnit>,
+    /// Units of the readings in the file, which are converted to SI: one of g, mg, m/s2 and one of deg/s, mdeg/s, rad/s; or count, or V
+    /// [default: by the names, by gravity at rest and by its turns]
+    #[cfg_attr(feature = "clap", arg(long, value_name = "G,DEG/S", conflicts_with_all = ["raw_unit", "means"]))]
+    pub units: Option<ReadingUnits>,
+    /// Topic of a bag (sensor_msgs/Imu; give two if gyro and accelerometer have one each) or of a PX4 log (sensor_gyro, sensor_combined,
+    /// vehicle_imu), or message of an ArduPilot log (IMU, GYR, IMT) [default: the only or the best one]
+    #[cfg_attr(feature = "clap", arg(long))]
+    pub topic: Vec<String>,
+    /// Sensor of a PX4 or ArduPilot log, counted from 0 [default: the only one]
+    #[cfg_attr(feature = "clap", arg(long, value_name = "N"))]
+    pub instance: Option<u32>,
+    /// What is known of the input: table (ref_ columns or --inputs), gravity (its magnitude at rest), or turntable-rate (the magnitude of
+    /// the rate, as on a record player; needs --rate-dps and --rate-error) [default: gravity, unless there are ref_ columns, --inputs or
+    /// --rate-dps]
+    #[cfg_attr(feature = "clap", arg(long))]
+    pub reference: Option<Reference>,
+    /// Magnitudes of the turntable's rates, deg/s: 200 for 33 1/3 rpm, 270 for 45 rpm. The readings show which dwell has which rate, unless
+    /// it is given by number, label or file name (`edge=270`, `rest=0`)
+    #[cfg_attr(
+        feature = "clap",
+        arg(
+            long,
+            value_name = "RATE",
+            value_delimiter = ',',
+            requires = "rate_error",
+            allow_negative_numbers = true
+        )
+    )]
+    pub rate_dps: Vec<TurntableRate>,
+    /// Error of these rates: half of a 95 % interval, like `0.1%`; no number of dwells reduces it
+    #[cfg_attr(feature = "clap", arg(long, value_name = "PERCENT", requires = "rate_dps", value_parser = crate::turntable::rate_error))]
+    pub rate_error: Option<f64>,
+    /// Factor for a column, or for gyro or accel: `gyro=0.0174533`
+    #[cfg_attr(feature = "clap", arg(long, value_name = "COLUMN=FACTOR"))]
+    pub scale: Vec<Scale>,
+    /// Number added to a column after its factor: `temp_c=36.53`
+    #[cfg_attr(
+        feature = "clap",
+        arg(long, value_name = "COLUMN=VALUE", allow_hyphen_values = true)
+    )]
+    pub offset: Vec<Offset>,
+    /// Columns whose low byte the firmware read as a signed number: gyro, accel or a column; corrected exactly, before --scale
+    ///
+    /// `(high << 8) + (int8_t)low` is 256 counts too low if the low byte is 128 or more. The readings have to be whole counts.
+    #[cfg_attr(
+        feature = "clap",
+        arg(long, value_name = "COLUMN", conflicts_with = "means")
+    )]
+    pub signed_low_byte: Vec<SignedLowByte>,
+    /// Raw columns of unsigned codes in two's complement, with their bits: `accel=12`
+    #[cfg_attr(
+        feature = "clap",
+        arg(long, value_name = "COLUMN=BITS", conflicts_with = "means")
+    )]
+    pub twos_complement: Vec<TwosComplement>,
+    /// Code of raw columns at zero input, subtracted before --scale: `gyro=2048`
+    #[cfg_attr(
+        feature = "clap",
+        arg(long, value_name = "COLUMN=CODE", conflicts_with = "means")
+    )]
+    pub zero: Vec<Zero>,
+    /// Name of the unit; recordings and calibrations of units with different names are not used together [default: unnamed]
+    #[cfg_attr(feature = "clap", arg(long))]
+    pub device: Option<String>,
+    /// Latitude, degrees
+    #[cfg_attr(
+        feature = "clap",
+        arg(
+            long = "latitude",
+            value_name = "LATITUDE",
+            allow_negative_numbers = true
+        )
+    )]
+    pub latitude_deg: Option<f64>,
+    /// CSV file with the known input of each dwell or turn: step, ref_rate_x_dps.., ref_force_x_mps2.., turn_x_deg..
+    ///
+    /// One row for each number or label of the column step; leave unknown inputs empty: `step,turn_x_deg,ref_force_x_mps2`, then
+    /// `face_up,,9.81` and `about_x,360,`.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "FILE"))]
+    pub inputs: Option<PathBuf>,
+    /// Separator of text files: comma, semicolon, tab, whitespace, or all characters that separate cells: `,;*` [default: recognised]
+    #[cfg_attr(feature = "clap", arg(long))]
+    pub separator: Option<Separator>,
+    /// Characters that begin a comment line in text files, or none [default: #%]
+    #[cfg_attr(feature = "clap", arg(long, value_name = "SIGNS"))]
+    pub comment: Option<CommentSigns>,
+    /// Leave out rows that cannot be read: at most this number (`=20`), or this share of each file (`=2%`) [without a value: 1%]
+    #[cfg_attr(feature = "clap", arg(long, value_name = "LIMIT", num_args = 0..=1, require_equals = true, default_missing_value = "1%", conflicts_with = "means"))]
+    pub skip_broken: Option<BrokenLimit>,
+    /// Use the readings although they look like those of two devices in turn, wrongly coded, or of another range from some row on
+    #[cfg_attr(feature = "clap", arg(long, conflicts_with = "means"))]
+    pub trust_readings: bool,
+}
+
+#[cfg(feature = "clap")]
+fn presets() -> impl clap::builder::TypedValueParser<Value = Preset> {
+    use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser as _};
+    let all = Preset::all().iter();
+    let names = all.map(|preset| PossibleValue::new(preset.name).help(preset.title));
+    PossibleValuesParser::new(names).try_map(|name| name.parse::<Preset>())
+}
+
+impl LogOptions {
+    /// The options as words of a command line.
+    pub fn arguments(&self) -> Vec<String> {
+        // Every field by its name: the compiler says which option is missing below.
+        let Self {
+            columns,
+            preset,
+            means,
+            step_gap_s,
+            filters,
+            rows,
+            rate_hz,
+            time_unit,
+            gravity_mps2,
+            raw_unit,
+            units,
+            topic,
+            instance,
+            reference,
+            rate_dps,
+            rate_error,
+            scale,
+            offset,
+            signed_low_byte,
+            twos_complement,
+            zero,
+            device,
+            latitude_deg,
+            inputs,
+            separator,
+            comment,
+            skip_broken,
+            trust_readings,
+        } = self;
+        let rates: Vec<String> = rate_dps.iter().map(TurntableRate::to_string).collect();
+        // Rounded, so that a share of 0.001 is written as 0.1 % instead of 0.1000000001 %.
+        let error = rate_error.map(|share| format!("{}%", (share * 1e8).round() / 1e6));
+        [
+            said_if("--means", *means),
+            said("--preset", preset.map(|preset| preset.name)),
+            said("--columns", columns),
+            said("--separator", separator),
+            said("--comment", comment),
+            said("--rate-hz", rate_hz),
+            said("--time-unit", time_unit.map(Decimal::symbol)),
+            said("--gravity", gravity_mps2),
+            said("--raw-unit", raw_unit),
+            said("--units", units),
+            said("--reference", reference),
+            said("--rate-dps", (!rates.is_empty()).then(|| rates.join(","))),
+            said("--rate-error", error),
+            said("--scale", scale),
+            said("--offset", offset),
+            said("--twos-complement", twos_complement),
+            said("--zero", zero),
+            said("--signed-low-byte", signed_low_byte),
+            skip_broken
+                .iter()
+                .map(|limit| format!("--skip-broken={limit}"))
+                .collect(),
+            said_if(TRUST_READINGS, *trust_readings),
+            said("--step-gap", step_gap_s),
+            said("--where", filters),
+            said("--rows", rows),
+            said("--topic", topic),
+            said("--instance", instance),
+            said("--device", device),
+            said("--latitude", latitude_deg),
+            said("--inputs", inputs.as_deref().map(file_name)),
+        ]
+        .concat()
+    }
+
+    /// How the lines of text files are to be read.
+    pub(super) fn text_format(&self) -> TextFormat {
+        TextFormat {
+            separator: self.separator,
+            comments: self.comment.unwrap_or_default(),
+        }
+    }
+
+    /// Which sensor of a log is wanted.
+    pub(super) fn choice(&self) -> Choice<'_> {
+        Choice {
+            topics: &self.topic,
+            instance: self.instance,
+        }
+    }
+
+    /// The turntable, if the magnitude of its rate is known.
+    pub(super) fn turntable(&self) -> Option<Turntable> {
+        self.rate_error
+            .map(|error| Turntable::new(&self.rate_dps, error))
+    }
+}
+
+/// The option `flag` with each of its values.
+fn said<T: Display>(flag: &str, values: impl IntoIterator<Item = T>) -> Vec<String> {
+    let each = values.into_iter();
+    each.flat_map(|value| [flag.to_owned(), value.to_string()])
+        .collect()
+}
+
+fn said_if(flag: &str, given: bool) -> Vec<String> {
+    given.then(|| flag.to_owned()).into_iter().collect()
+}
 
 /// What to import and how.
 #[derive(Debug, Clone)]
 pub struct ImportOptions {
     /// Files; the later ones are joined onto the times of the first.
     pub files: Vec<PathBuf>,
-    /// One list for each file; none if the headers have the names of a recording. A single file may have several, for sensors in separate columns or rows.
-    pub columns: Vec<ColumnList>,
-    /// Separator of text files; detected if `None`.
-    pub separator: Option<Separator>,
-    /// Characters that begin the comment lines of text files.
-    pub comments: CommentSigns,
-    /// Sample rate in Hz. Files without time stamps need it; for others it decides between two possible units of the stamps.
-    pub rate_hz: Option<f64>,
-    /// Unit of the time stamps; detected if `None`.
-    pub time_unit: Option<Decimal>,
+    /// What is known of them. Columns: one list for each file; none if the headers have the names of a recording. A single file may have several, for
+    /// sensors in separate columns or rows. Its gravity, unit and reference, if any, are those below.
+    pub log: LogOptions,
     /// Local gravity in m/s².
     pub gravity_mps2: f64,
     /// Unit of the raw columns, after scaling.
     pub raw_unit: RawUnit,
     /// What is known of the true input.
     pub reference: Reference,
-    /// Factors for columns; several for the same column multiply.
-    pub scales: Vec<Scale>,
-    /// What is added to columns after their factors; several for the same column add up.
-    pub offsets: Vec<Offset>,
-    /// Columns whose low byte a firmware took for a signed number. They are corrected in whole counts, before any factor.
-    pub signed_low_bytes: Vec<SignedLowByte>,
-    /// Columns of unsigned codes in two's complement.
-    pub twos_complements: Vec<TwosComplement>,
-    /// Codes at an input of 0, subtracted before any factor; several for the same column add up.
-    pub zeros: Vec<Zero>,
-    /// Topics of a log: one, or those of gyro and accelerometer. Without them, the only one with messages of an inertial unit, or the only two that
-    /// have one sensor each.
-    pub topics: Vec<String>,
-    /// Which of several sensors of a topic of a log; without it, the only one.
-    pub instance: Option<u32>,
-    /// Name of the unit; without it, [`UNNAMED`].
-    pub device: Option<String>,
-    /// Latitude in degrees.
-    pub latitude_deg: Option<f64>,
-    /// The turntable, if the magnitude of its rate is known.
-    pub turntable: Option<Turntable>,
-    /// Table of the known input of each step.
-    pub inputs: Option<PathBuf>,
     /// Whether the files follow one another, each a step labelled with its file name. Otherwise they are joined on their times.
     pub sequence: bool,
     /// Face of the unit that was up in each file; the files are then a sequence. Otherwise empty.
     pub faces: Vec<Face>,
-    /// A longer pause than this, in s, begins a new step; `None` if a column numbers the steps, or they are found later.
-    pub step_gap_s: Option<f64>,
-    /// Filters of text and Parquet files: a row is read if it satisfies all of them. If one column is to have several values, each value chooses the
-    /// rows of one list of columns.
-    pub filters: Vec<RowFilter>,
-    /// Which data rows of the first file are read, or of each file of a sequence; all if `None`.
-    pub rows: Option<RowRange>,
-    /// How many rows that cannot be read may be left out.
-    pub skip_broken: BrokenLimit,
-    /// Whether readings are used although they look like those of two devices, or wrongly coded.
-    pub trust_readings: bool,
-    /// Whether each row is the mean over a pose or a step instead of a sample.
-    pub means: bool,
     /// The preset that was used; see [`ImportOptions::with_preset`].
     pub preset: Option<PresetUse>,
     /// Its warnings.
@@ -103,33 +336,12 @@ impl ImportOptions {
     ) -> Self {
         Self {
             files,
-            columns: Vec::new(),
-            separator: None,
-            comments: CommentSigns::default(),
-            rate_hz: None,
-            time_unit: None,
+            log: LogOptions::default(),
             gravity_mps2,
             raw_unit,
             reference,
-            scales: Vec::new(),
-            offsets: Vec::new(),
-            signed_low_bytes: Vec::new(),
-            twos_complements: Vec::new(),
-            zeros: Vec::new(),
-            topics: Vec::new(),
-            instance: None,
-            device: None,
-            latitude_deg: None,
-            turntable: None,
-            inputs: None,
             sequence: false,
             faces: Vec::new(),
-            step_gap_s: None,
-            filters: Vec::new(),
-            rows: None,
-            skip_broken: BrokenLimit::None,
-            trust_readings: false,
-            means: false,
             preset: None,
             preset_warnings: Vec::new(),
             format: SampleFormat::default(),
@@ -140,12 +352,13 @@ impl ImportOptions {
     /// Adds what a preset knows about the files where nothing was given by hand. The unit of the readings stays, because every caller gives it.
     pub fn with_preset(mut self, chosen: Chosen) -> Self {
         self.files = chosen.files;
-        if self.columns.is_empty() {
-            self.columns = chosen.columns;
+        if self.log.columns.is_empty() {
+            self.log.columns = chosen.columns;
         }
-        let scales = Scale::beside(&chosen.scales, &self.scales);
-        self.scales.extend(scales);
-        self.rate_hz = self.rate_hz.or(chosen.rate_hz);
+        let scales = Scale::beside(&chosen.scales, &self.log.scale);
+        self.log.scale.extend(scales);
+        self.log.rate_hz = self.log.rate_hz.or(chosen.rate_hz);
+        self.log.preset = chosen.used.name.parse().ok();
         self.preset = Some(chosen.used);
         self.preset_warnings = chosen.warnings;
         self
@@ -154,12 +367,12 @@ impl ImportOptions {
     /// Refuses options that contradict each other, or a recording at `out` that contains one of the files.
     pub(super) fn check(&self, out: &Path) -> Result<()> {
         let refuse = |problem: String, remedy: &str| Err(Error::new("import", problem, remedy));
-        let (files, lists) = (self.files.len(), self.columns.len());
+        let (files, lists) = (self.files.len(), self.log.columns.len());
         if files == 0 {
             return refuse("no file is given".to_owned(), "name the files to import");
         }
         let one_for_all = self.is_sequence() && lists == 1;
-        let of_one_file = files == 1 && !self.is_sequence() && !self.means;
+        let of_one_file = files == 1 && !self.is_sequence() && !self.log.means;
         if lists != 0 && lists != files && !one_for_all && !of_one_file {
             return refuse(
                 format!("{files} files but {lists} lists of columns are given"),
@@ -172,7 +385,7 @@ impl ImportOptions {
                 "give one file for each face",
             );
         }
-        if let Some(gap) = self.step_gap_s
+        if let Some(gap) = self.log.step_gap_s
             && !(gap > 0.0 && gap.is_finite())
         {
             return refuse(
@@ -180,7 +393,7 @@ impl ImportOptions {
                 "write the seconds that separate two dwells",
             );
         }
-        if self.step_gap_s.is_some() && (self.is_sequence() || self.means) {
+        if self.log.step_gap_s.is_some() && (self.is_sequence() || self.log.means) {
             let problem =
                 "dwells are to be separated by pauses, but each file or row is a dwell already";
             return refuse(problem.to_owned(), "leave out one of the two");
@@ -195,46 +408,46 @@ impl ImportOptions {
                 "give one file for each face, or name files with --sequence",
             );
         }
-        if !self.faces.is_empty() && self.inputs.is_some() {
+        if !self.faces.is_empty() && self.log.inputs.is_some() {
             let problem = "the faces give the inputs, but a table of inputs is given too";
             return refuse(problem.to_owned(), "give one of the two");
         }
-        if self.means && !self.signed_low_bytes.is_empty() {
+        if self.log.means && !self.log.signed_low_byte.is_empty() {
             return refuse(
                 "a low byte is corrected in single samples, but these are means".to_owned(),
                 "import the samples from which the means were computed",
             );
         }
-        if self.means && !(self.twos_complements.is_empty() && self.zeros.is_empty()) {
+        if self.log.means && !(self.log.twos_complement.is_empty() && self.log.zero.is_empty()) {
             return refuse(
                 "codes are read in single samples, but these are means".to_owned(),
                 "import the samples, or give the means as readings",
             );
         }
-        if self.means && self.rows.is_some() {
+        if self.log.means && self.log.rows.is_some() {
             return refuse(
                 "rows are chosen by their numbers, but this is a table of means".to_owned(),
                 "give a table with only these rows",
             );
         }
-        if self.means && !self.filters.is_empty() {
+        if self.log.means && !self.log.filters.is_empty() {
             return refuse(
                 "rows are chosen by a column, but this is a table of means".to_owned(),
                 "give a table with only these rows",
             );
         }
         self.check_filters()?;
-        if let Some(rate) = self.rate_hz {
+        if let Some(rate) = self.log.rate_hz {
             check_rate(rate, "import, sample_rate_hz")
                 .map_err(|e| e.about(Argument::SampleRate))?;
         }
         check_gravity(self.gravity_mps2, "import, gravity")?;
-        if self.means && self.reference == Reference::TurntableRate {
+        if self.log.means && self.reference == Reference::TurntableRate {
             let problem = "the rate of a turntable is a reference for samples, but these are means";
             return refuse(problem.to_owned(), "import the samples");
         }
         // A source inside the recording that is to be replaced would be deleted with it.
-        for file in self.files.iter().chain(&self.inputs) {
+        for file in self.files.iter().chain(&self.log.inputs) {
             let (Ok(file), Ok(out)) = (file.canonicalize(), out.canonicalize()) else {
                 continue;
             };
@@ -248,7 +461,7 @@ impl ImportOptions {
 
     /// Name of the unit.
     pub(super) fn unit(&self) -> &str {
-        self.device.as_deref().unwrap_or(UNNAMED)
+        self.log.device.as_deref().unwrap_or(UNNAMED)
     }
 
     /// Whether the files follow one another.
@@ -259,105 +472,37 @@ impl ImportOptions {
     /// The options as arguments of `mimu import`, for the manifest. File names come without folders, which are useless on another machine and may be
     /// private.
     pub fn arguments(&self) -> Vec<String> {
-        let mut arguments: Vec<String> = self.files.iter().map(|file| file_name(file)).collect();
-        if !self.faces.is_empty() {
-            for (argument, face) in arguments.iter_mut().zip(&self.faces) {
-                *argument = format!("{face}={argument}");
-            }
-            arguments.insert(0, "--faces".to_owned());
-        }
-        if self.means {
-            arguments.push("--means".to_owned());
-        }
-        if self.sequence {
-            arguments.push("--sequence".to_owned());
-        }
-        let mut option = |name: &str, value: String| arguments.extend([name.to_owned(), value]);
-        if let Some(preset) = &self.preset {
-            option("--preset", preset.name.to_owned());
-        }
-        for list in &self.columns {
-            option("--columns", list.to_string());
-        }
-        if let Some(separator) = self.separator {
-            option("--separator", separator.to_string());
-        }
-        if self.comments != CommentSigns::default() {
-            option("--comment", self.comments.to_string());
-        }
-        if let Some(rate) = self.rate_hz {
-            option("--rate-hz", rate.to_string());
-        }
-        if let Some(unit) = self.time_unit {
-            option("--time-unit", unit.symbol().to_owned());
-        }
-        option("--gravity", self.gravity_mps2.to_string());
-        option("--raw-unit", self.raw_unit.to_string());
-        option("--reference", self.reference.to_string());
-        for (name, value) in self.turntable.iter().flat_map(Turntable::arguments) {
-            option(name, value);
-        }
-        for scale in &self.scales {
-            option("--scale", scale.to_string());
-        }
-        for offset in &self.offsets {
-            option("--offset", offset.to_string());
-        }
-        for codes in &self.twos_complements {
-            option("--twos-complement", codes.to_string());
-        }
-        for zero in &self.zeros {
-            option("--zero", zero.to_string());
-        }
-        for column in &self.signed_low_bytes {
-            option("--signed-low-byte", column.to_string());
-        }
-        if self.skip_broken != BrokenLimit::None {
-            arguments.push(format!("--skip-broken={}", self.skip_broken));
-        }
-        if self.trust_readings {
-            arguments.push(TRUST_READINGS.to_owned());
-        }
-        let mut option = |name: &str, value: String| arguments.extend([name.to_owned(), value]);
-        if let Some(gap) = self.step_gap_s {
-            option("--step-gap", gap.to_string());
-        }
-        for filter in &self.filters {
-            option("--where", filter.to_string());
-        }
-        if let Some(rows) = self.rows {
-            option("--rows", rows.to_string());
-        }
-        for topic in &self.topics {
-            option("--topic", topic.clone());
-        }
-        if let Some(instance) = self.instance {
-            option("--instance", instance.to_string());
-        }
-        if let Some(device) = &self.device {
-            option("--device", device.clone());
-        }
-        if let Some(latitude) = self.latitude_deg {
-            option("--latitude", latitude.to_string());
-        }
-        if let Some(inputs) = &self.inputs {
-            option("--inputs", file_name(inputs));
-        }
-        arguments
-    }
-
-    /// How the lines of text files are to be read.
-    pub(super) fn text_format(&self) -> TextFormat {
-        TextFormat {
-            separator: self.separator,
-            comments: self.comments,
-        }
+        let files = self.files.iter().map(|file| file_name(file));
+        let files: Vec<String> = match self.faces.is_empty() {
+            true => files.collect(),
+            false => self
+                .faces
+                .iter()
+                .zip(files)
+                .map(|(face, file)| format!("{face}={file}"))
+                .collect(),
+        };
+        let log = LogOptions {
+            gravity_mps2: Some(self.gravity_mps2),
+            raw_unit: Some(self.raw_unit),
+            reference: Some(self.reference),
+            // The factors say it.
+            units: None,
+            ..self.log.clone()
+        };
+        [
+            said_if("--faces", !self.faces.is_empty()),
+            files,
+            said_if("--sequence", self.sequence),
+            log.arguments(),
+        ]
+        .concat()
     }
 
     /// Number of sources of rows: the files, or the lists of columns of a single file with several.
     pub(super) fn sources(&self) -> usize {
         match self.has_one_file_for_all() {
-            true => self.columns.len(),
+            true => self.log.columns.len(),
             false => self.files.len(),
         }
     }
@@ -374,7 +519,7 @@ impl ImportOptions {
 
     /// Whether each list of columns takes other columns or rows of the only file.
     pub(super) fn has_one_file_for_all(&self) -> bool {
-        self.files.len() == 1 && self.columns.len() > 1
+        self.files.len() == 1 && self.log.columns.len() > 1
     }
 
     /// The filters of a source. If one column is to have several values, each value belongs to one source, in their order.
@@ -383,18 +528,18 @@ impl ImportOptions {
             let values: Vec<&RowFilter> = self.values(filter).collect();
             values.len() < 2 || values.get(source) == Some(filter)
         };
-        self.filters.iter().filter(own).cloned().collect()
+        self.log.filters.iter().filter(own).cloned().collect()
     }
 
     /// The filters of the column of `filter`.
     fn values<'a>(&'a self, filter: &'a RowFilter) -> impl Iterator<Item = &'a RowFilter> {
-        let all = self.filters.iter();
+        let all = self.log.filters.iter();
         all.filter(move |other| other.column() == filter.column())
     }
 
     /// Refuses filters of one column with several values unless each belongs to a source.
     fn check_filters(&self) -> Result<()> {
-        for filter in &self.filters {
+        for filter in &self.log.filters {
             let values = self.values(filter).count();
             if values > 1 && (values != self.sources() || self.is_sequence()) {
                 let problem = format!(
@@ -412,24 +557,12 @@ impl ImportOptions {
 
     pub(super) fn how(&self, source: usize) -> HowToRead<'_> {
         HowToRead {
-            list: self.columns.get(source),
-            format: self.text_format(),
-            scales: &self.scales,
-            offsets: &self.offsets,
-            signed_low_bytes: &self.signed_low_bytes,
-            twos_complements: &self.twos_complements,
-            zeros: &self.zeros,
+            log: &self.log,
+            list: self.log.columns.get(source),
             filters: self.filters(source),
-            rows: self.rows.filter(|_| source == 0),
-            choice: Choice {
-                topics: &self.topics,
-                instance: self.instance,
-            },
+            rows: self.log.rows.filter(|_| source == 0),
             part: 0,
-            rate_hz: self.rate_hz,
-            time_unit: self.time_unit,
-            skip_broken: self.skip_broken,
-            trust_readings: self.trust_readings,
+            rate_hz: self.log.rate_hz,
             empty_zero_temperatures: false,
             skip_empty: self.has_one_file_for_all(),
         }

@@ -257,7 +257,7 @@ pub(super) fn import_means(options: &ImportOptions, out: &Path) -> Result<Import
             "put them into one table",
         );
     }
-    if options.inputs.is_some() {
+    if options.log.inputs.is_some() {
         let remedy = "write the known inputs into the table: ref_rate_x_dps, ref_force_x_mps2 and the others";
         return refuse(
             "a table of inputs is given in addition to a table of means",
@@ -271,9 +271,9 @@ pub(super) fn import_means(options: &ImportOptions, out: &Path) -> Result<Import
     {
         return refuse("a table of means is read from text", "write it as CSV");
     }
-    let list = options.columns.first();
-    let factors = (&options.scales[..], &options.offsets[..]);
-    let table = Table::read(path, list, options.text_format(), factors)?;
+    let list = options.log.columns.first();
+    let factors = (&options.log.scale[..], &options.log.offset[..]);
+    let table = Table::read(path, list, options.log.text_format(), factors)?;
     if options.reference == Reference::Table && table.columns.reference == [false; 6] {
         return Err(Error::new(
             path.display(),
@@ -284,13 +284,13 @@ pub(super) fn import_means(options: &ImportOptions, out: &Path) -> Result<Import
     }
     let mut manifest = Manifest::new(
         options.unit(),
-        options.rate_hz.unwrap_or(f64::NAN),
+        options.log.rate_hz.unwrap_or(f64::NAN),
         options.gravity_mps2,
         options.raw_unit,
         options.reference,
     );
     manifest.means = true;
-    manifest.latitude_deg = options.latitude_deg;
+    manifest.latitude_deg = options.log.latitude_deg;
     manifest.imported_with = options.arguments();
     manifest.sources.push(source(path)?);
     manifest.check("import")?;

@@ -99,13 +99,14 @@ impl<'a> Sequence<'a> {
     /// Opens the file of `step`, at its position after the others.
     fn open(&mut self, step: usize, path: &Path) -> Result<JoinedFiles> {
         let options = self.options;
-        let list = options.columns.get(step).or(options.columns.first());
-        let one = ImportOptions {
+        let mut one = ImportOptions {
             files: vec![path.to_owned()],
-            columns: list.cloned().into_iter().collect(),
             preset_warnings: Vec::new(),
             ..options.clone()
         };
+        let lists = &options.log.columns;
+        let list = lists.get(step).or(lists.first());
+        one.log.columns = list.cloned().into_iter().collect();
         let mut import = JoinedFiles::open(&one, self.left_out)?;
         if import.first.has_step() {
             let problem = "it has a column step, but in a sequence each file is a dwell";
@@ -209,7 +210,7 @@ impl SequenceRecording {
         options: &ImportOptions,
         inputs: Option<&StepInputs>,
     ) -> Result<ImportSummary> {
-        if let Some(file) = &options.inputs {
+        if let Some(file) = &options.log.inputs {
             self.manifest.sources.push(source(file)?);
         }
         let mut summary = self.summary;

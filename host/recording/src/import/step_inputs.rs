@@ -28,7 +28,7 @@ impl StepInputs {
     /// From the faces or the table of `options`, if they give inputs. Faces give inputs only if the reference is a table: with gravity only the
     /// magnitude is known.
     pub fn of(options: &ImportOptions) -> Result<Option<Self>> {
-        let table = match &options.inputs {
+        let table = match &options.log.inputs {
             _ if !options.faces.is_empty() => (options.reference == Reference::Table)
                 .then(|| Inputs::of_faces(&options.faces, options.gravity_mps2)),
             Some(path) => Some(Inputs::read(path)?),

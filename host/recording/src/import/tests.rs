@@ -57,7 +57,7 @@ impl Bench {
     fn options(&self, files: &[&str], columns: &[&str]) -> ImportOptions {
         let files = files.iter().map(|name| self.path(name)).collect();
         let mut options = ImportOptions::new(files, 9.81, RawUnit::Count, Reference::Gravity);
-        options.columns = columns.iter().map(|list| list.parse().unwrap()).collect();
+        options.log.columns = columns.iter().map(|list| list.parse().unwrap()).collect();
         options
     }
 
@@ -96,7 +96,7 @@ impl Bench {
 fn one(text: &str, columns: &str) -> Result<(ImportSummary, Batch, Manifest)> {
     let bench = Bench::new(&[("a.txt", text)]);
     let mut options = bench.options(&["a.txt"], &[columns]);
-    options.rate_hz = Some(100.0);
+    options.log.rate_hz = Some(100.0);
     bench.import(&options)
 }
 
@@ -219,7 +219,7 @@ fn time_comes_from_a_column_from_an_index_or_from_the_rate() {
     let error = bench.refused(&bench.options(&["a"], &["gyro_x,gyro_y,gyro_z"]));
     assert!(error.contains("give the rate"), "{error}");
     let mut options = bench.options(&["b"], &["t_s,gyro_x,gyro_y,gyro_z"]);
-    options.scales = vec!["t_s=0.001".parse().unwrap(), "gyro=2".parse().unwrap()];
+    options.log.scale = vec!["t_s=0.001".parse().unwrap(), "gyro=2".parse().unwrap()];
     let (_, batch, manifest) = bench.import(&options).unwrap();
     assert_eq!(manifest.sample_rate_hz, 50.0);
     assert_eq!((batch.t_s[2], batch.raw[2][0]), (0.04, 6.0));
@@ -284,7 +284,7 @@ fn binary_files_are_refused_with_what_to_do() {
         let bench = Bench::new(&[]);
         std::fs::write(bench.path("a.mat"), bytes).unwrap();
         let mut options = bench.options(&["a.mat"], &["gyro_x,gyro_y,gyro_z"]);
-        options.rate_hz = Some(1.0);
+        options.log.rate_hz = Some(1.0);
         let error = bench.refused(&options);
         assert!(error.contains(words), "{error}");
     }
@@ -363,9 +363,9 @@ fn labelled_steps_get_numbers_and_the_known_inputs_of_their_steps() {
     let inputs = "step,ref_force_x_mps2,turn_x_deg\nx_a,9.81,\nx_rot,,360\nghost,1,\n";
     let bench = Bench::new(&[("s.csv", SESSION), ("inputs.csv", inputs)]);
     let mut options = bench.options(&["s.csv"], &["step,sample,accel_x,accel_y,accel_z"]);
-    options.rate_hz = Some(2.0);
+    options.log.rate_hz = Some(2.0);
     options.reference = Reference::Table;
-    options.inputs = Some(bench.path("inputs.csv"));
+    options.log.inputs = Some(bench.path("inputs.csv"));
     let (summary, batch, manifest) = bench.import(&options).unwrap();
     assert_eq!(manifest.step_labels, ["x_a", "x_rot", "y_a"]);
     assert_eq!(batch.step, [0, 0, 1, 1, 1, 1, -1, 0, 2]);
@@ -387,11 +387,11 @@ fn labelled_steps_get_numbers_and_the_known_inputs_of_their_steps() {
 fn inputs_without_steps_and_a_table_without_inputs_are_refused() {
     let bench = Bench::new(&[("s.csv", SESSION), ("i.csv", "step,turn_x_deg\nx_a,1\n")]);
     let mut options = bench.options(&["s.csv"], &["-,sample,accel_x,accel_y,accel_z"]);
-    options.rate_hz = Some(2.0);
-    options.inputs = Some(bench.path("i.csv"));
+    options.log.rate_hz = Some(2.0);
+    options.log.inputs = Some(bench.path("i.csv"));
     let error = bench.refused(&options);
     assert!(error.contains("no column is step"), "{error}");
-    options.inputs = None;
+    options.log.inputs = None;
     options.reference = Reference::Table;
     let error = bench.refused(&options);
     assert!(error.contains("ref_ column"), "{error}");
@@ -401,7 +401,7 @@ fn inputs_without_steps_and_a_table_without_inputs_are_refused() {
 fn a_parquet_file_is_imported_by_name_and_equals_its_source() {
     let bench = Bench::new(&[("s.csv", SESSION)]);
     let mut options = bench.options(&["s.csv"], &["step,sample,accel_x,accel_y,accel_z"]);
-    options.rate_hz = Some(2.0);
+    options.log.rate_hz = Some(2.0);
     let (_, expected, _) = bench.import(&options).unwrap();
     let copy = bench.path("copy.parquet");
     std::fs::copy(bench.path("out").join("samples.parquet"), copy).unwrap();
@@ -434,7 +434,7 @@ fn a_source_inside_the_recording_to_replace_is_not_deleted() {
     std::fs::create_dir(&out).unwrap();
     std::fs::write(out.join("samples.csv"), "1,2,3\n").unwrap();
     let mut options = bench.options(&["out/samples.csv"], &["gyro_x,gyro_y,gyro_z"]);
-    options.rate_hz = Some(1.0);
+    options.log.rate_hz = Some(1.0);
     options.replace = true;
     let error = import(&options, &out, |_| ()).unwrap_err().to_string();
     assert!(error.contains("is inside the recording"), "{error}");
@@ -470,7 +470,7 @@ proptest! {
         let list = if by_name { "t_s=a,gyro_x=b,gyro_y=c,gyro_z=d,step=e" } else { "t_s,gyro_x,gyro_y,gyro_z,step" };
         let mut options = bench.options(&["a"], &[list]);
         let _ = bench.import(&options);
-        options.inputs = Some(bench.path("i"));
+        options.log.inputs = Some(bench.path("i"));
         let _ = bench.import(&options);
     }
 
@@ -479,7 +479,7 @@ proptest! {
         let list = ["t_s,gyro_x,gyro_y,gyro_z", "step,gyro_x,gyro_y,gyro_z,-", "t_s=n,gyro_x=a,gyro_y=1,gyro_z=2"][list];
         let bench = Bench::new(&[("a", &text), ("b", &text)]);
         let mut options = bench.options(&["a"], &[list]);
-        options.rate_hz = Some(1.0);
+        options.log.rate_hz = Some(1.0);
         let _ = bench.import(&options);
         let _ = bench.import(&bench.options(&["a", "b"], &["t_s,gyro_x,gyro_y,gyro_z", "t_s,accel_x,accel_y,accel_z"]));
     }

@@ -42,8 +42,8 @@ impl AcceptArgs {
     /// Local gravity with its standard uncertainty, if the person says anything of it.
     fn gravity(&self) -> Option<[f64; 2]> {
         let by_latitude = |at: f64| [normal_gravity(at), BY_LATITUDE];
-        let given = self.log.options.gravity.map(|g| [g, 0.0]);
-        given.or(self.log.options.latitude.map(by_latitude))
+        let given = self.log.options.gravity_mps2.map(|g| [g, 0.0]);
+        given.or(self.log.options.latitude_deg.map(by_latitude))
     }
 
     /// Hands the samples of each unit to `consume`.

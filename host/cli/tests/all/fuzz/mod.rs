@@ -29,7 +29,7 @@ use mimu::signal::stillness::STILL_FACTOR;
 use mimu_cli::report;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{
-    ColumnList, ImportOptions, RawUnit, Recording, Reference, SampleFormat, import,
+    ColumnList, ImportOptions, LogOptions, RawUnit, Recording, Reference, SampleFormat, import,
 };
 
 use mutation::*;
@@ -444,10 +444,13 @@ fn import_mutated(seeds: &Seeds, folder: &Path, random: &mut Random) -> Result<(
         Some(7.0),
     ];
     let options = ImportOptions {
-        columns,
-        rate_hz: rates[random.below(rates.len())],
-        scales,
-        inputs,
+        log: LogOptions {
+            columns,
+            rate_hz: rates[random.below(rates.len())],
+            scale: scales,
+            inputs,
+            ..LogOptions::default()
+        },
         format: if random.one_in(2) {
             SampleFormat::Csv
         } else {

@@ -11,16 +11,15 @@ mod tests;
 
 use std::path::{Path, PathBuf};
 
-use serde::Serialize;
-
 use self::guess::grows_evenly;
 pub use guess::{Guess, Units, guess};
 
 use self::names::{Meaning, meaning, unknown_triad};
 use super::assignment::{ColumnList, Role, Scale};
 use super::preview::{Preview, preview};
+use super::reading_units::{ReadingUnits, STANDARD_GRAVITY, si};
 use super::time::{Decimal, Seen, Unit, calendar_time};
-use crate::error::{Error, Result};
+use crate::error::{Argument, Error, Result};
 use crate::separator::Separator;
 use crate::units::UnitFound;
 use crate::{Column, RAW_COLUMNS, RawUnit};
@@ -37,7 +36,6 @@ const PER_G: [f64; 8] = [
 ];
 /// Largest share by which gravity in counts may differ from a nominal one.
 const OFF_NOMINAL: f64 = 0.08;
-const STANDARD_GRAVITY: f64 = 9.80665;
 
 /// One file as it was looked at.
 #[derive(Debug, Clone)]
@@ -68,11 +66,7 @@ impl FileLook {
             let separator = self
                 .separator
                 .map(|separator| format!(" --separator '{separator}'"));
-            return format!(
-                "--columns {}{}",
-                roles.join(","),
-                separator.unwrap_or_default()
-            );
+            return format!("{}{}", roles.join(","), separator.unwrap_or_default());
         }
         let mut items: Vec<String> = used
             .map(|k| format!("{}={}", roles[k], self.names[k]))
@@ -94,19 +88,21 @@ impl FileLook {
         let list = items.join(",");
         let plain = |c: char| c.is_alphanumeric() || "_.,=-".contains(c);
         match list.chars().all(plain) {
-            true => format!("--columns {list}"),
-            false => format!("--columns '{list}'"),
+            true => list,
+            false => format!("'{list}'"),
         }
     }
 }
 
-/// What a person has to say, with the options that say it.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+/// What a person has to say.
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Question {
     /// What is not known, and why, as a sentence without a full stop.
     pub about: String,
-    /// What to add to the command, as `--units g,deg/s`, with a choice where several are possible.
-    pub answer: String,
+    /// The setting that answers it.
+    pub setting: Argument,
+    /// Its value, with a choice where several are possible.
+    pub value: String,
 }
 
 /// What was found in files that belong together.
@@ -126,102 +122,17 @@ pub struct Look {
     pub questions: Vec<Question>,
 }
 
-/// Units that a person gives, and settings that answer questions.
-#[derive(Debug, Clone, Default)]
+/// What a person has said of files.
+#[derive(Debug, Clone, Copy, Default)]
 pub struct Given {
-    /// Unit of the accelerometer, as in [`UnitFound::unit`].
-    pub accel: Option<&'static str>,
-    /// Unit of the gyro.
-    pub gyro: Option<&'static str>,
+    /// Units of the readings.
+    pub units: ReadingUnits,
     /// Whether the unit of the readings is given in another way.
     pub raw_unit: bool,
     /// Whether the sample rate is given.
     pub rate: bool,
     /// Unit of the time stamps.
     pub time_unit: Option<Decimal>,
-}
-
-/// The units that `--units` takes, with what they are in SI; `count` and `V` have no size.
-const UNITS: [(&str, &str, Option<f64>); 10] = [
-    ("g", "accel", Some(STANDARD_GRAVITY)),
-    ("mg", "accel", Some(1e-3 * STANDARD_GRAVITY)),
-    ("m/s²", "accel", Some(1.0)),
-    ("rad/s", "gyro", Some(1.0)),
-    ("deg/s", "gyro", Some(std::f64::consts::PI / 180.0)),
-    ("mdeg/s", "gyro", Some(std::f64::consts::PI / 180_000.0)),
-    ("count", "", None),
-    ("V", "", None),
-    ("m/s2", "accel", Some(1.0)),
-    ("dps", "gyro", Some(std::f64::consts::PI / 180.0)),
-];
-
-impl Given {
-    /// Units as `g,deg/s`, in any order; `count` and `V` hold for both sensors.
-    ///
-    /// # Errors
-    /// An unknown unit, or two for one sensor.
-    pub fn with_units(mut self, text: &str) -> Result<Self> {
-        let refuse = |problem: String| {
-            Error::new(
-                "units",
-                problem,
-                "give one of g, mg, m/s2 and one of deg/s, mdeg/s, rad/s, as g,deg/s; or count, or V",
-            )
-        };
-        let mut words: Vec<&str> = text.split(',').map(str::trim).collect();
-        let of_both = |word: &&str| {
-            UNITS
-                .iter()
-                .any(|(n, sensor, _)| n == word && sensor.is_empty())
-        };
-        words.sort_by_key(of_both);
-        for word in words {
-            let known = UNITS.iter().find(|(name, ..)| *name == word);
-            let Some((name, sensor, _)) = known else {
-                return Err(refuse(format!("{word:?} is no unit of readings")));
-            };
-            let name = match *name {
-                "m/s2" => "m/s²",
-                "dps" => "deg/s",
-                other => other,
-            };
-            for (which, unit) in [("gyro", &mut self.gyro), ("accel", &mut self.accel)] {
-                // `g,count` are the two sensors' units.
-                if sensor.is_empty() && unit.is_none() || *sensor == which {
-                    if unit.is_some_and(|before| before != name) && !sensor.is_empty() {
-                        return Err(refuse(format!("the {which} has two units")));
-                    }
-                    *unit = Some(name);
-                }
-            }
-        }
-        Ok(self)
-    }
-
-    /// Unit of readings after a conversion, and the factors to it of gyro and accelerometer, if their units are given.
-    ///
-    /// # Errors
-    /// One sensor in a unit and the other in counts or V: a recording has one unit for both.
-    pub fn conversion(&self) -> Result<(RawUnit, [Option<f64>; 2])> {
-        let given = [self.gyro, self.accel];
-        let factors = given.map(|unit| unit.map(si));
-        if factors.into_iter().flatten().all(|factor| factor.is_some()) {
-            return Ok((RawUnit::Si, factors.map(Option::flatten)));
-        }
-        match given {
-            [Some("count"), Some("count")] => Ok((RawUnit::Count, [Some(1.0); 2])),
-            [Some("V"), Some("V")] => Ok((RawUnit::Volt, [Some(1.0); 2])),
-            _ => Err(Error::new(
-                "units",
-                "one sensor is in a unit and the other in counts or V, and a recording has one unit for both",
-                "convert the readings of one of them",
-            )),
-        }
-    }
-}
-
-fn si(unit: &str) -> Option<f64> {
-    UNITS.iter().find(|(name, ..)| *name == unit)?.2
 }
 
 impl Look {
@@ -282,10 +193,11 @@ impl Look {
         roles.any(|role| role.starts_with("ref_"))
     }
 
-    fn ask(&mut self, about: String, answer: &str) {
+    fn ask(&mut self, about: String, setting: Argument, value: &str) {
         self.questions.push(Question {
             about,
-            answer: answer.into(),
+            setting,
+            value: value.into(),
         });
     }
 
@@ -317,7 +229,7 @@ impl Look {
                     few(&names)
                 ),
             };
-            self.ask(about, list);
+            self.ask(about, Argument::Columns, list);
             return;
         }
         for (sensor, count) in [("gyro", gyro), ("accelerometer", accel)] {
@@ -326,7 +238,7 @@ impl Look {
                     "{count} of the three axes of the {sensor} are known among {}",
                     few(&names)
                 );
-                self.ask(about, list);
+                self.ask(about, Argument::Columns, list);
             }
         }
         self.ask_about_names([gyro, accel], list);
@@ -357,7 +269,7 @@ impl Look {
                 let about =
                     "the file has no names, and the readings do not show which triad feels gravity"
                         .into();
-                self.ask(about, list);
+                self.ask(about, Argument::Columns, list);
             }
         }
         let timed = has("t_s");
@@ -382,7 +294,7 @@ impl Look {
             .files
             .iter()
             .map(|look| look.columns_to_complete(counts));
-        lists.collect::<Vec<String>>().join(" ")
+        lists.collect::<Vec<String>>().join(" --columns ")
     }
 
     /// Asks for the rate, or whether a column that grows is the time.
@@ -400,21 +312,21 @@ impl Look {
                 let about = format!(
                     "no column is known to be a time; {name:?} grows evenly, and may be one"
                 );
-                let known = list.trim_start_matches("--columns ").trim_matches('\'');
-                let answer = match known.contains('=') && self.files.len() == 1 {
-                    true => format!("--columns 't_s={name},{known}'"),
-                    false => self.rate_answer(),
-                };
-                self.ask(about, &answer);
+                let known = list.trim_matches('\'');
+                match known.contains('=') && self.files.len() == 1 {
+                    true => self.ask(about, Argument::Columns, &format!("'t_s={name},{known}'")),
+                    false => self.ask_for_rate(about),
+                }
             }
-            None => self.ask("no column is a time".into(), &self.rate_answer()),
+            None => self.ask_for_rate("no column is a time".into()),
         }
     }
 
-    /// The option that gives the rate, with the one that the file says.
-    fn rate_answer(&self) -> String {
+    /// Asks for the rate, with the one that the file says.
+    fn ask_for_rate(&mut self, about: String) {
         let stated = self.files.iter().find_map(|look| look.rate_hz);
-        stated.map_or("--rate-hz RATE".into(), |rate| format!("--rate-hz {rate}"))
+        let value = stated.map_or("RATE".into(), |rate| rate.to_string());
+        self.ask(about, Argument::SampleRate, &value);
     }
 
     /// Asks about names that stand for two sensors, and about a triad of an unknown name where one sensor is missing: left out without a word, the fit
@@ -446,7 +358,7 @@ impl Look {
             }
         }
         for about in asked {
-            self.ask(about, list);
+            self.ask(about, Argument::Columns, list);
         }
     }
 
@@ -479,20 +391,21 @@ impl Look {
             if let Some(role) = roles.iter_mut().find(|role| **role == "t_s") {
                 *role = "sample";
             }
-            self.ask(about, &self.rate_answer());
+            self.ask_for_rate(about);
         } else if look.guess.grows
             && let Err([fine, coarse]) = Unit::recognise(&Seen::of(&times))
         {
             let [fine, coarse] = [fine, coarse].map(|unit| format!("{unit} ({})", unit.symbol()));
             let about =
                 format!("the column {name:?} grows evenly, as a time in {fine} or {coarse} would");
-            self.ask(about, "--time-unit UNIT");
+            self.ask(about, Argument::TimeUnit, "UNIT");
         }
     }
 
     /// Decides the unit of the readings, or asks.
     fn take_units(&mut self, given: &Given) {
-        for (found, said) in [(&mut self.gyro, given.gyro), (&mut self.accel, given.accel)] {
+        let said = given.units;
+        for (found, said) in [(&mut self.gyro, said.gyro), (&mut self.accel, said.accel)] {
             if let (Some(found), Some(unit)) = (found.as_mut(), said) {
                 found.unit = Some(unit);
                 found.reason = "as given".into();
@@ -520,7 +433,7 @@ impl Look {
             }) = found
             {
                 let about = format!("the unit of the {sensor} is open ({choices}): {reason}");
-                self.ask(about, &format!("--units {unit}"));
+                self.ask(about, Argument::Units, unit);
             }
         }
         let [gyro, accel] = [&self.gyro, &self.accel].map(|f| f.as_ref().and_then(|f| f.unit));
@@ -567,10 +480,8 @@ impl Look {
             }
             _ => {
                 let about = "one sensor is in a unit and the other in counts, and a recording has one unit for both".into();
-                self.ask(
-                    about,
-                    "--raw-unit SI --scale gyro=RAD/S_PER_COUNT (or accel=M/S²_PER_COUNT)",
-                );
+                let value = "SI --scale gyro=RAD/S_PER_COUNT (or accel=M/S²_PER_COUNT)";
+                self.ask(about, Argument::RawUnit, value);
             }
         }
     }
@@ -626,20 +537,22 @@ impl Look {
     pub fn refusal(&self, place: &Path, command: &str) -> Option<Error> {
         self.questions.first()?;
         let about: Vec<&str> = self.questions.iter().map(|q| q.about.as_str()).collect();
-        // Both units are one option.
-        let mut answers: Vec<String> = Vec::new();
-        for question in &self.questions {
-            let unit = question.answer.strip_prefix("--units ");
-            let before = answers.iter_mut().find(|a| a.starts_with("--units "));
-            match (unit, before) {
-                (Some(unit), Some(units)) => *units += &format!(",{unit}"),
-                _ => answers.push(question.answer.clone()),
+        let mut answers: Vec<(Argument, String)> = Vec::new();
+        for Question { setting, value, .. } in &self.questions {
+            let before = answers.iter_mut().find(|(units, _)| units == setting);
+            match before.filter(|_| *setting == Argument::Units) {
+                // Both units are one option.
+                Some((_, units)) => *units += &format!(",{value}"),
+                None => answers.push((*setting, value.clone())),
             }
         }
+        let options = answers
+            .iter()
+            .map(|(setting, value)| format!(" {} {value}", setting.flags()));
         Some(Error::new(
             place.display(),
             about.join("; "),
-            format!("say it: {command} {}", answers.join(" ")),
+            format!("say it: {command}{}", options.collect::<String>()),
         ))
     }
 }

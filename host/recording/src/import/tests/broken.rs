@@ -24,7 +24,7 @@ const BROKEN: [(usize, &str); 5] = [
 fn limited(text: &str, limit: &str) -> Result<(ImportSummary, Batch, Manifest)> {
     let bench = Bench::new(&[("a.txt", text)]);
     let mut options = bench.options(&["a.txt"], &[NAMES]);
-    options.skip_broken = limit.parse()?;
+    options.log.skip_broken = Some(limit.parse()?);
     bench.import(&options)
 }
 
@@ -96,8 +96,8 @@ fn a_broken_row_of_a_file_without_times_takes_its_time() {
         .collect();
     let bench = Bench::new(&[("a.txt", &text)]);
     let mut options = bench.options(&["a.txt"], &["gyro_x,gyro_y,gyro_z"]);
-    options.rate_hz = Some(100.0);
-    options.skip_broken = BrokenLimit::Rows(1);
+    options.log.rate_hz = Some(100.0);
+    options.log.skip_broken = Some(BrokenLimit::Rows(1));
     let (summary, batch, _) = bench.import(&options).unwrap();
     assert_eq!(summary.rows, 99);
     assert_eq!((batch.t_s[39], batch.t_s[40]), (0.39, 0.41));

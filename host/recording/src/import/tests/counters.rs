@@ -39,7 +39,7 @@ fn a_packet_counter_is_no_clock_and_its_losses_are_gaps_at_the_given_rate() {
         let refused = import(&options, &bench.path("out"), |_| ()).unwrap_err();
         let arguments = &refused.refused().arguments;
         assert!(arguments.contains(&Argument::SampleRate), "{refused}");
-        options.rate_hz = Some(128.0);
+        options.log.rate_hz = Some(128.0);
         let (summary, batch, manifest) = bench.import(&options).unwrap();
         let time = &summary.time[0];
         assert_eq!((manifest.sample_rate_hz, time.counter), (128.0, true));
@@ -50,7 +50,7 @@ fn a_packet_counter_is_no_clock_and_its_losses_are_gaps_at_the_given_rate() {
     }
     // If the numbers are milliseconds, a person knows it.
     let mut options = bench.options(&["bare.csv"], &[GYRO]);
-    options.time_unit = Some(Decimal::Millisecond);
+    options.log.time_unit = Some(Decimal::Millisecond);
     let (summary, ..) = bench.import(&options).unwrap();
     assert!(!summary.time[0].counter);
 }
@@ -63,7 +63,7 @@ fn a_counter_without_losses_asks_for_its_rate_beside_the_unit_of_a_clock() {
     let refused = import(&options, &bench.path("out"), |_| ()).unwrap_err();
     let arguments = &refused.refused().arguments;
     assert_eq!(arguments[..], [Argument::TimeUnit, Argument::SampleRate]);
-    options.rate_hz = Some(50.0);
+    options.log.rate_hz = Some(50.0);
     let (summary, batch, _) = bench.import(&options).unwrap();
     assert_eq!(
         (summary.time[0].counter, batch.t_s[399]),
@@ -82,12 +82,12 @@ fn a_counter_that_rises_by_four_is_used_with_a_warning_and_one_that_starts_again
     ]);
     let list = "sample,gyro_x,gyro_y,gyro_z";
     let mut options = bench.options(&["fours.csv"], &[list]);
-    options.rate_hz = Some(200.0);
+    options.log.rate_hz = Some(200.0);
     let (summary, batch, manifest) = bench.import(&options).unwrap();
     assert_eq!((manifest.sample_rate_hz, batch.t_s[1]), (50.0, 4.0 / 200.0));
     assert_eq!((summary.time[0].gaps, summary.warnings.len()), (0, 1));
     let mut options = bench.options(&["again.csv"], &[list]);
-    options.rate_hz = Some(200.0);
+    options.log.rate_hz = Some(200.0);
     let refused = bench.refused(&options);
     assert!(refused.contains("data row 401"), "{refused}");
 }

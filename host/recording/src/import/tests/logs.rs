@@ -17,7 +17,7 @@ const ARDUPILOT: &[u8] = include_bytes!("../ardupilot/fixtures/two-sensors.bin")
 #[test]
 fn the_two_sensors_of_a_log_are_joined_on_the_times_of_one() {
     let (bench, mut options) = log("flight.bin", ARDUPILOT);
-    options.instance = Some(1);
+    options.log.instance = Some(1);
     let (summary, batch, manifest) = bench.import(&options).unwrap();
     assert_eq!((summary.sample_rate_hz, summary.time.len()), (800.0, 2));
     // Its times are TimeUS and SampleUS.
@@ -45,7 +45,7 @@ fn the_two_sensors_of_a_log_are_joined_on_the_times_of_one() {
     );
     let with = manifest.imported_with.join(" ");
     assert!(with.contains("--instance 1"), "{with}");
-    options.instance = None;
+    options.log.instance = None;
     let error = bench.refused(&options);
     assert!(
         error.contains("IMU instance 0") && error.contains("IMU instance 1"),
@@ -56,15 +56,15 @@ fn the_two_sensors_of_a_log_are_joined_on_the_times_of_one() {
 #[test]
 fn what_does_not_go_with_a_log_is_refused() {
     let (bench, mut options) = log("flight.bin", ARDUPILOT);
-    options.instance = Some(0);
-    options.filters = vec!["channel=3".parse().unwrap()];
+    options.log.instance = Some(0);
+    options.log.filters = vec!["channel=3".parse().unwrap()];
     assert!(
         bench
             .refused(&options)
             .contains("messages of a log have no columns")
     );
-    options.filters.clear();
-    options.columns = vec!["t_s,accel_x,accel_y,accel_z".parse().unwrap()];
+    options.log.filters.clear();
+    options.log.columns = vec!["t_s,accel_x,accel_y,accel_z".parse().unwrap()];
     assert!(
         bench
             .refused(&options)

@@ -12,10 +12,10 @@ fn imported(text: &str, list: &str, scales: &[&str]) -> Result<PoseMeans> {
     let bench = Bench::new(&[("a.csv", text)]);
     let mut options = bench.options(&["a.csv"], &[]);
     if !list.is_empty() {
-        options.columns = vec![list.parse()?];
+        options.log.columns = vec![list.parse()?];
     }
-    options.means = true;
-    options.scales = scales.iter().map(|s| s.parse().unwrap()).collect();
+    options.log.means = true;
+    options.log.scale = scales.iter().map(|s| s.parse().unwrap()).collect();
     let out = bench.path("out");
     let outcome = import(&options, &out, |_| ());
     assert_eq!(outcome.is_ok(), out.exists());

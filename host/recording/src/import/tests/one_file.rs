@@ -24,7 +24,7 @@ fn two_values_of_a_column_choose_the_rows_of_two_sensors() {
     let text = flagged(500) + "1603503886325,7,1,2,3\n";
     let bench = Bench::new(&[("a.csv", &text)]);
     let mut options = bench.options(&["a.csv"], &[ACCEL, GYRO]);
-    options.filters = filters(&["flag=1", "flag=2"]);
+    options.log.filters = filters(&["flag=1", "flag=2"]);
     let (summary, batch, manifest) = bench.import(&options).unwrap();
     assert_eq!((summary.rows, manifest.sample_rate_hz), (500, 100.0));
     // Only the row of the third kind was not chosen by anybody.
@@ -37,7 +37,7 @@ fn two_values_of_a_column_choose_the_rows_of_two_sensors() {
     let with = manifest.imported_with.join(" ");
     assert!(with.contains("--where flag=1 --where flag=2"), "{with}");
     // The order of the lists is that of the values.
-    options.columns.reverse();
+    options.log.columns.reverse();
     let (_, other, _) = bench.import(&options).unwrap();
     assert_eq!((other.raw[3][1], other.raw[0][1]), (0.01, 0.1));
 }
@@ -46,13 +46,13 @@ fn two_values_of_a_column_choose_the_rows_of_two_sensors() {
 fn values_of_a_column_need_a_list_of_columns_each() {
     let bench = Bench::new(&[("a.csv", &flagged(200))]);
     let mut options = bench.options(&["a.csv"], &[ACCEL]);
-    options.filters = filters(&["flag=1", "flag=2"]);
+    options.log.filters = filters(&["flag=1", "flag=2"]);
     let refused = import(&options, &bench.path("out"), |_| ()).unwrap_err();
     let arguments = &refused.refused().arguments;
     assert_eq!(arguments[..], [Argument::Where, Argument::Columns]);
     // A value that is not there is named.
     let mut options = bench.options(&["a.csv"], &[ACCEL, GYRO]);
-    options.filters = filters(&["flag=1", "flag=3"]);
+    options.log.filters = filters(&["flag=1", "flag=3"]);
     assert!(bench.refused(&options).contains("flag=3"));
 }
 
@@ -73,7 +73,7 @@ fn rows_of_two_kinds_may_differ_in_width_and_rate() {
         "-,t_s,gyro_x,gyro_y,gyro_z",
     ];
     let mut options = bench.options(&["a.csv"], &lists);
-    options.filters = filters(&["1=ACC", "1=GYR"]);
+    options.log.filters = filters(&["1=ACC", "1=GYR"]);
     let (summary, batch, _) = bench.import(&options).unwrap();
     assert_eq!(
         (summary.sample_rate_hz, summary.time[1].rate_hz),
@@ -131,13 +131,13 @@ fn lines_that_all_look_like_comments_are_named_and_read_if_none_is_a_comment() {
     let bench = Bench::new(&[("a.asc", &percent(400))]);
     let list = "-,-,-,-,t_s,-,accel_z,accel_y,accel_x,gyro_z,gyro_y,gyro_x,-";
     let mut options = bench.options(&["a.asc"], &[list]);
-    options.separator = Some(",;*".parse().unwrap());
+    options.log.separator = Some(",;*".parse().unwrap());
     let refused = import(&options, &bench.path("out"), |_| ()).unwrap_err();
     assert_eq!(refused.refused().arguments[..], [Argument::Comment]);
     let line = refused.to_string();
     assert!(line.contains("400 lines begin with %"), "{line}");
-    options.comments = "none".parse().unwrap();
-    options.scales = ["accel=0.5", "accel_y=-1"]
+    options.log.comment = Some("none".parse().unwrap());
+    options.log.scale = ["accel=0.5", "accel_y=-1"]
         .map(|s| s.parse().unwrap())
         .into();
     let (summary, batch, manifest) = bench.import(&options).unwrap();

@@ -36,9 +36,9 @@ fn the_six_directions_of_a_realsense_camera_are_steps_with_known_inputs() {
     let inputs = "step,ref_force_x_mps2,ref_force_y_mps2,ref_force_z_mps2\n0,0,-9.81,0\n1,9.81,0,0\n2,0,9.81,0\n3,-9.81,0,0\n4,0,0,-9.81\n5,0,0,9.81\n";
     let bench = Bench::new(&[("accel_cam.txt", &directions()), ("inputs", inputs)]);
     let mut options = realsense(&bench, &["accel_cam.txt"]).unwrap();
-    options.step_gap_s = Some(1.0);
+    options.log.step_gap_s = Some(1.0);
     options.reference = Reference::Table;
-    options.inputs = Some(bench.path("inputs"));
+    options.log.inputs = Some(bench.path("inputs"));
     let (summary, batch, manifest) = bench.import(&options).unwrap();
     assert_eq!((summary.rows, summary.sample_rate_hz), (240, 200.0));
     assert_eq!(batch.step, (0..240).map(|i| i / 40).collect::<Vec<i32>>());
@@ -55,7 +55,7 @@ fn the_six_directions_of_a_realsense_camera_are_steps_with_known_inputs() {
             .any(|w| w == ["--step-gap", "1"])
     );
     // Without the pause, the file has no steps for the inputs.
-    options.step_gap_s = None;
+    options.log.step_gap_s = None;
     assert!(bench.refused(&options).contains("no column is step"));
 }
 
@@ -88,25 +88,25 @@ fn pauses_that_contradict_other_steps_are_refused() {
         ("turns", "step,turn_x_deg\n0,360\n"),
     ]);
     let mut options = bench.options(&["a"], &[]);
-    options.step_gap_s = Some(1.0);
+    options.log.step_gap_s = Some(1.0);
     assert!(bench.refused(&options).contains("it has a column step"));
-    options.columns = vec![
+    options.log.columns = vec![
         "t_s=t_s,accel_x=accel_x,accel_y=accel_y,accel_z=accel_z"
             .parse()
             .unwrap(),
     ];
-    options.time_unit = Some("s".parse().unwrap());
-    options.inputs = Some(bench.path("turns"));
+    options.log.time_unit = Some("s".parse().unwrap());
+    options.log.inputs = Some(bench.path("turns"));
     assert!(
         bench
             .refused(&options)
             .contains("pauses do not separate turns")
     );
-    options.inputs = None;
+    options.log.inputs = None;
     options.sequence = true;
     assert!(bench.refused(&options).contains("a dwell already"));
     options.sequence = false;
-    options.step_gap_s = Some(-1.0);
+    options.log.step_gap_s = Some(-1.0);
     assert!(bench.refused(&options).contains("-1 s is not a pause"));
 }
 
@@ -121,9 +121,9 @@ fn codes_become_readings_in_the_order_of_the_converter() {
         ),
     ]);
     let mut options = bench.options(&["a"], &[]);
-    options.twos_complements = vec!["accel=12".parse().unwrap()];
-    options.zeros = vec!["accel_z=60".parse().unwrap()];
-    options.scales = vec!["accel=0.5".parse().unwrap()];
+    options.log.twos_complement = vec!["accel=12".parse().unwrap()];
+    options.log.zero = vec!["accel_z=60".parse().unwrap()];
+    options.log.scale = vec!["accel=0.5".parse().unwrap()];
     let (_, batch, manifest) = bench.import(&options).unwrap();
     assert_eq!(batch.raw[3], [-0.5, -1.0, 0.5]);
     assert_eq!(batch.raw[4], [-1024.0, 1023.5, 0.0]);

@@ -122,8 +122,8 @@ fn counts_taken_for_degrees_are_refused_unless_a_factor_and_an_offset_make_them_
     }
     let bench = Bench::new(&[("a", &text)]);
     let mut options = bench.options(&["a"], &[list]);
-    options.scales = vec!["temp_c=0.00294118".parse().unwrap()];
-    options.offsets = vec!["temp_c=36.53".parse().unwrap()];
+    options.log.scale = vec!["temp_c=0.00294118".parse().unwrap()];
+    options.log.offset = vec!["temp_c=36.53".parse().unwrap()];
     let (summary, batch, manifest) = bench.import(&options).unwrap();
     // -7049 / 340 + 36.53, by the data sheet.
     assert!(

@@ -294,7 +294,7 @@ fn what_is_given_by_hand_goes_before_a_preset() {
         &["data.csv"],
         &["t_s,gyro_z,gyro_y,gyro_x,accel_x,accel_y,accel_z"],
     );
-    options.scales = vec!["accel_x=2".parse().unwrap(), "t_s=2e-9".parse().unwrap()];
+    options.log.scale = vec!["accel_x=2".parse().unwrap(), "t_s=2e-9".parse().unwrap()];
     let (summary, batch, manifest) = bench.import(&options.with_preset(chosen)).unwrap();
     assert_eq!(batch.raw[2][0], 0.125);
     assert_eq!(batch.raw[3][0], 3.0);

@@ -22,7 +22,7 @@ const LIST: &str = "t_s=ms,accel_x=a,accel_y=b,accel_z=c";
 fn chosen(text: &str, columns: &str, filters: &[&str]) -> Result<(ImportSummary, Batch, Manifest)> {
     let bench = Bench::new(&[("a.csv", text)]);
     let mut options = bench.options(&["a.csv"], &[columns]);
-    options.filters = filters.iter().map(|text| text.parse().unwrap()).collect();
+    options.log.filters = filters.iter().map(|text| text.parse().unwrap()).collect();
     bench.import(&options)
 }
 
@@ -55,8 +55,8 @@ fn several_choices_hold_at_once_and_numbers_are_compared_as_numbers() {
     let list = "-,t_s,-,accel_x,accel_y,accel_z";
     let bench = Bench::new(&[("a.csv", &three_sensors(""))]);
     let mut options = bench.options(&["a.csv"], &[list]);
-    options.filters = vec!["1=3".parse().unwrap()];
-    options.time_unit = Some("ms".parse().unwrap());
+    options.log.filters = vec!["1=3".parse().unwrap()];
+    options.log.time_unit = Some("ms".parse().unwrap());
     assert_eq!(bench.import(&options).unwrap().1.raw[3], [3.0; 20]);
 }
 
@@ -99,22 +99,22 @@ fn rows_of_a_parquet_file_are_chosen_alike() {
         &["a.csv"],
         &["step=range,t_s=ms,temp_c=channel,accel_x=a,accel_y=b,accel_z=c"],
     );
-    options.time_unit = Some("ms".parse().unwrap());
-    options.filters = vec!["channel=3".parse().unwrap()];
+    options.log.time_unit = Some("ms".parse().unwrap());
+    options.log.filters = vec!["channel=3".parse().unwrap()];
     bench.import(&options).unwrap();
     std::fs::copy(bench.path("out/samples.parquet"), bench.path("b.parquet")).unwrap();
     let mut options = bench.options(
         &["b.parquet"],
         &["t_s=t_s,accel_x=accel_x,accel_y=accel_y,accel_z=accel_z"],
     );
-    options.time_unit = Some("s".parse().unwrap());
-    options.filters = vec!["step=1".parse().unwrap()];
+    options.log.time_unit = Some("s".parse().unwrap());
+    options.log.filters = vec!["step=1".parse().unwrap()];
     let (summary, batch, _) = bench.import(&options).unwrap();
     assert_eq!((summary.rows, summary.not_chosen), (10, 10));
     assert_eq!(batch.raw[5][0], 32.0);
-    options.filters = vec!["step=4".parse().unwrap()];
+    options.log.filters = vec!["step=4".parse().unwrap()];
     assert!(bench.refused(&options).contains("\"0\", \"1\""));
-    options.filters = vec!["range=4".parse().unwrap()];
+    options.log.filters = vec!["range=4".parse().unwrap()];
     assert!(bench.refused(&options).contains("accel_x"));
 }
 
@@ -125,8 +125,8 @@ fn the_rows_before_and_after_a_fault_are_imported_apart() {
     let bench = Bench::new(&[("a.csv", &format!("ms,a,b,c\n{text}"))]);
     for (rows, first, count) in [("..20", 0.0, 20), ("21..", 20.0, 40), ("5..30", 4.0, 26)] {
         let mut options = bench.options(&["a.csv"], &[LIST]);
-        options.rows = Some(rows.parse().unwrap());
-        options.rate_hz = Some(100.0);
+        options.log.rows = Some(rows.parse().unwrap());
+        options.log.rate_hz = Some(100.0);
         let (summary, batch, manifest) = bench.import(&options).unwrap();
         assert_eq!((summary.rows, summary.not_chosen), (count, 60 - count));
         assert_eq!(batch.raw[3][0], first);
@@ -135,7 +135,7 @@ fn the_rows_before_and_after_a_fault_are_imported_apart() {
         assert!(arguments.into_iter().any(|w| w == given));
     }
     let mut options = bench.options(&["a.csv"], &[LIST]);
-    options.rows = Some("61..".parse().unwrap());
+    options.log.rows = Some("61..".parse().unwrap());
     assert!(bench.import(&options).is_err());
 }
 

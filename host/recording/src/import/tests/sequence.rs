@@ -23,7 +23,7 @@ fn six_faces() -> (Bench, ImportOptions) {
     let mut options = bench.options(&["z_up.csv", "z_down.csv", "level.csv"], &[LIST]);
     options.sequence = true;
     options.reference = Reference::Table;
-    options.inputs = Some(bench.path("inputs"));
+    options.log.inputs = Some(bench.path("inputs"));
     (bench, options)
 }
 
@@ -145,7 +145,7 @@ fn faces_that_contradict_each_other_are_refused() {
     options.faces = faces(&["+z"]);
     assert!(bench.refused(&options).contains("2 files but 1 faces"));
     options.faces = faces(&["+z", "-z"]);
-    options.inputs = Some(bench.path("inputs"));
+    options.log.inputs = Some(bench.path("inputs"));
     assert!(
         bench
             .refused(&options)

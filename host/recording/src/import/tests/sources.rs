@@ -97,7 +97,7 @@ fn a_person_can_say_that_suspicious_readings_are_right() {
                 .contains(&Argument::TrustReadings),
             "{refused}"
         );
-        options.trust_readings = true;
+        options.log.trust_readings = true;
         let (summary, batch, manifest) = bench.import(&options).unwrap();
         assert!(warned(&summary, words), "{summary:?}");
         assert_eq!(batch.len(), text.lines().count());
@@ -148,7 +148,7 @@ fn unsigned_codes_of_negative_readings_are_named_with_their_bits_and_overflows_w
     assert!(error.contains("gyro_x=16"), "{error}");
     let bench = Bench::new(&[("a.txt", &log(600, codes))]);
     let mut options = bench.options(&["a.txt"], &[BOTH]);
-    options.twos_complements = vec!["gyro_x=16".parse().unwrap()];
+    options.log.twos_complement = vec!["gyro_x=16".parse().unwrap()];
     let (_, batch, _) = bench.import(&options).unwrap();
     assert_eq!(batch.raw[0][100], f64::from(swing(100)));
     // A turn beyond the range of the firmware's integers.
@@ -175,7 +175,7 @@ fn readings_without_gravity_are_named_and_the_magnitude_that_is_given_is_the_med
         let bench = Bench::new(&[("a.txt", &text)]);
         let mut options = bench.options(&["a.txt"], &[BOTH]);
         options.raw_unit = RawUnit::Si;
-        options.rate_hz = Some(100.0);
+        options.log.rate_hz = Some(100.0);
         bench.import(&options).unwrap().0
     };
     let summary = si([0.02, 0.01, 0.03]);

@@ -30,7 +30,7 @@ fn a_file_with_nanoseconds_since_1970_has_the_rate_to_all_its_digits() {
     assert!((batch.t_s[1999] - batch.t_s[0] - 9.995).abs() < 1e-12);
     // The result is the same if the factor is given, or with seconds of nine decimals.
     let mut options = bench.options(&["a"], &[GYR]);
-    options.scales = vec!["t_s=1e-9".parse().unwrap()];
+    options.log.scale = vec!["t_s=1e-9".parse().unwrap()];
     assert_eq!(bench.import(&options).unwrap().1, batch);
     let last = batch.t_s[1999];
     let seconds = |line: &str| format!("{}.{}\n", &line[..10], &line[10..]);
@@ -106,7 +106,7 @@ fn a_slow_log_is_asked_for_its_unit_and_not_made_a_thousand_times_as_fast() {
         let mut options = bench.options(&["a"], &[GYR]);
         let error = bench.refused(&options);
         assert!(error.contains(coarse) && error.contains(fine), "{error}");
-        options.time_unit = Some("us".parse().unwrap());
+        options.log.time_unit = Some("us".parse().unwrap());
         let (summary, _, manifest) = bench.import(&options).unwrap();
         assert!((summary.sample_rate_hz * step as f64 / 1e6 - 1.0).abs() < 1e-4);
         assert!(
@@ -115,8 +115,8 @@ fn a_slow_log_is_asked_for_its_unit_and_not_made_a_thousand_times_as_fast() {
                 .windows(2)
                 .any(|w| w == ["--time-unit", "us"])
         );
-        options.time_unit = None;
-        options.rate_hz = Some(1e6 / step as f64);
+        options.log.time_unit = None;
+        options.log.rate_hz = Some(1e6 / step as f64);
         let given = bench.import(&options).unwrap().0;
         assert_eq!(given.time[0].unit, Some(Decimal::Microsecond));
     }
@@ -276,7 +276,7 @@ fn turns_of_a_loop_last_by_its_stamps() {
     let bench = Bench::new(&[("a", &text), ("i", "step,turn_x_deg\n0,\n1,360\n")]);
     let list = "t_s=t_ms,step=s,gyro_x=wx,gyro_y=wy,gyro_z=wz";
     let mut options = bench.options(&["a"], &[list]);
-    options.inputs = Some(bench.path("i"));
+    options.log.inputs = Some(bench.path("i"));
     options.reference = Reference::Table;
     let (summary, batch, _) = bench.import(&options).unwrap();
     assert!(summary.time[0].polled.is_some(), "{summary:?}");

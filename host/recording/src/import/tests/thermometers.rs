@@ -18,7 +18,7 @@ fn zeros_throughout_are_no_thermometer_whatever_the_offset() {
     let bench = Bench::new(&[("a", &text)]);
     let mut options = bench.options(&["a"], &[LIST]);
     for offset in ["temp_c=0", "temp_c=36.53"] {
-        options.offsets = vec![offset.parse().unwrap()];
+        options.log.offset = vec![offset.parse().unwrap()];
         let (summary, batch, _) = bench.import(&options).unwrap();
         assert!(batch.temp_c.is_empty() && batch.raw[3].len() == 300);
         assert!(warned(&summary, "0 in all of its 300 rows"), "{summary:?}");
