@@ -1,16 +1,12 @@
-//! fang, section 5.1: its Table 3 and noise, with its six and nine positions and with our own designs.
+//! fang, section 5.1: its Table 3 and noise, with six positions and its nine.
 
 use mimu::estimate::known_input::{kalman, least_squares};
 use mimu::estimate::six_positions::six_positions;
 use mimu::estimate::{EarthShare, Estimated, Observation};
-use mimu::plan::design::Problem;
-use mimu::plan::design::model::{Model, Setting, Terms};
-use mimu::plan::design::reach::Fixture;
 use mimu::plan::design::schemes::{FANG_FILTERS, Scheme};
 use mimu::quantity::Sensor;
 use mimu::triad::{Angles, Forward, Physical};
 use mimu_core::kalman::Filter;
-use mimu_recording::Reference;
 use mimu_rig::ideal::{self, FANG_TABLE_3, Ideal};
 use mimu_rig::random::Random;
 use nalgebra::{Matrix3, Vector3};
@@ -32,64 +28,42 @@ enum Estimator {
     KalmanOfFour,
 }
 
-/// A scheme, the number of readings in each of its positions relative to the other contenders, and an estimator.
+/// A scheme and an estimator.
 struct Contender {
     name: &'static str,
     positions: Vec<Vector3<f64>>,
-    /// In halves: 2 is the full number.
-    share: u32,
     estimator: Estimator,
 }
 
-fn directions(settings: &[Setting]) -> Vec<Vector3<f64>> {
-    settings.iter().map(|s| s.up).collect()
-}
-
-fn contenders() -> Vec<Contender> {
-    let scheme = |s: Scheme| directions(&s.settings(Sensor::Accel).expect("a scheme of poses"));
-    let (six, nine) = (scheme(Scheme::SixFace), scheme(Scheme::FangNine));
-    let model = Model::accel(Reference::Table, &Terms::default());
-    let problem = Problem::accel(model, Fixture::ThreeAxis).expect("affine on the whole sphere");
-    let ours = directions(&problem.best(9, 1).expect("nine determine four"));
-    let new = |name, positions: &Vec<Vector3<f64>>, share, estimator| Contender {
-        name,
-        positions: positions.clone(),
-        share,
-        estimator,
-    };
-    vec![
-        new("six faces, scale and bias only", &six, 2, Estimator::Scalar),
-        new("six faces, least squares", &six, 2, Estimator::LeastSquares),
-        new(
-            "fang's nine, least squares",
-            &nine,
-            2,
-            Estimator::LeastSquares,
-        ),
-        new("fang's nine, Kalman", &nine, 2, Estimator::Kalman),
-        new(
+fn contenders() -> [Contender; 5] {
+    let [six, nine] = [Scheme::SixFace, Scheme::FangNine].map(|scheme| {
+        let settings = scheme.settings(Sensor::Accel).expect("a scheme of poses");
+        settings.iter().map(|s| s.up).collect::<Vec<_>>()
+    });
+    [
+        ("six faces, scale and bias only", &six, Estimator::Scalar),
+        ("six faces, least squares", &six, Estimator::LeastSquares),
+        ("fang's nine, least squares", &nine, Estimator::LeastSquares),
+        ("fang's nine, Kalman", &nine, Estimator::Kalman),
+        (
             "fang's nine, Kalman, four each",
             &nine,
-            2,
             Estimator::KalmanOfFour,
         ),
-        new("our nine, least squares", &ours, 2, Estimator::LeastSquares),
-        new(
-            "six faces, as long as nine",
-            &six,
-            3,
-            Estimator::LeastSquares,
-        ),
     ]
+    .map(|(name, positions, estimator)| Contender {
+        name,
+        positions: positions.clone(),
+        estimator,
+    })
 }
 
 impl Contender {
     fn dwells(&self, truth: &Ideal, readings: u32, random: &mut Random) -> Vec<Observation> {
-        let n = readings * self.share / 2;
         let dwell = |(dwell, up): (usize, &Vector3<f64>)| Observation {
             dwell,
-            raw: truth.read((*up).into(), n, random).into(),
-            variance: Vector3::repeat(SIGMA * SIGMA / f64::from(n)),
+            raw: truth.read((*up).into(), readings, random).into(),
+            variance: Vector3::repeat(SIGMA * SIGMA / f64::from(readings)),
             input: *up,
             earth: EarthShare::NONE,
             change: Vector3::zeros(),
@@ -178,7 +152,6 @@ fn over_axes(squares: &[f64; 3]) -> f64 {
 fn errors_of(truth: &Ideal, of_truth: &[Vector3<f64>; 4], angles: Angles, readings: u32) -> Table {
     let mut table = Table::new(&[
         "scheme and estimator",
-        "dwells",
         "bias",
         "scale factor",
         "misalignment, rad",
@@ -187,11 +160,7 @@ fn errors_of(truth: &Ideal, of_truth: &[Vector3<f64>; 4], angles: Angles, readin
     for contender in contenders() {
         let [_, squares] = monte_carlo(&contender, truth, of_truth, angles, readings);
         let cells = squares.iter().map(|s| significant(over_axes(s)));
-        let start = [
-            contender.name.to_string(),
-            contender.positions.len().to_string(),
-        ];
-        table.row(start.into_iter().chain(cells));
+        table.row([contender.name.to_string()].into_iter().chain(cells));
     }
     table
 }

@@ -100,7 +100,7 @@ fn powers() -> Table {
         "x at 10 deg/s, mean and rms, deg/h",
         "y",
     ]);
-    for exponent in [0, -3, -4, -5, -6, -7] {
+    for exponent in [0, -4, -5, -6] {
         let power = 10f64.powi(exponent);
         let bias = ["b_gx", "b_gy"].map(|name| course(cubic(name, 1, power)));
         let scale = ["δs_gx", "δs_gy"].map(|name| course(cubic(name, 1, power)));
@@ -304,26 +304,6 @@ fn noise_of_a_scheme() -> Table {
     table
 }
 
-/// Largest distance of straight lines between 16 even nodes from the bias curves of the MTi-G's gyros, deg/h.
-fn lines_between_nodes() -> Table {
-    let mut table = Table::new(&["16 nodes over, °C", "b_gx, deg/h", "b_gy", "b_gz"]);
-    for [from, to] in [[-10.0, 70.0], [-40.0, 85.0]] {
-        let step = (to - from) / 15.0;
-        let cells = ["b_gx", "b_gy", "b_gz"].map(|name| {
-            let a = cubic(name, 0, 1.0);
-            let at = |t: f64| a[0] + t * (a[1] + t * (a[2] + t * a[3]));
-            let off = (0..1500).map(|k| {
-                let (node, share) = (from + step * f64::from(k / 100), 0.01 * f64::from(k % 100));
-                let line = at(node) + share * (at(node + step) - at(node));
-                (at(node + share * step) - line).abs()
-            });
-            significant(off.fold(0.0, f64::max))
-        });
-        table.row([format!("{from} to {to}")].into_iter().chain(cells));
-    }
-    table
-}
-
 /// All blocks of this study.
 pub fn blocks() -> Vec<Block> {
     vec![
@@ -333,6 +313,5 @@ pub fn blocks() -> Vec<Block> {
         Block::table("niu, contradictions", &contradictions()),
         Block::table("niu, directions", &directions()),
         Block::table("niu, noise of a scheme", &noise_of_a_scheme()),
-        Block::table("niu, nodes", &lines_between_nodes()),
     ]
 }

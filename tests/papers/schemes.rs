@@ -71,12 +71,12 @@ pub fn blocks() -> Vec<Block> {
     vec![
         Block::table(
             "schemes, poses known",
-            &table(&accel(Reference::Table), Sensor::Accel, &[6, 8, 9, 33]),
+            &table(&accel(Reference::Table), Sensor::Accel, &[9, 33]),
         ),
         Block::table(
             "schemes, size of gravity",
-            &table(&accel(Reference::Gravity), Sensor::Accel, &[9, 12, 33]),
+            &table(&accel(Reference::Gravity), Sensor::Accel, &[12, 33]),
         ),
-        Block::table("schemes, rates", &table(&gyro, Sensor::Gyro, &[6, 9, 61])),
+        Block::table("schemes, rates", &table(&gyro, Sensor::Gyro, &[9, 61])),
     ]
 }

@@ -3,8 +3,6 @@
 //! The units are niu's, behind sensors with outputs in volts, as on the device. `mimu thermal fit` on niu's own ramp makes the calibration. It is
 //! encoded and decoded as for the device, and applied in single precision by the code that the firmware runs.
 
-use std::path::Path;
-
 use mimu::quantity::Sensor;
 use mimu::signal::blocks::extent;
 use mimu_core::compensation::Sample;
@@ -14,7 +12,6 @@ use mimu_rig::located::Source;
 use mimu_rig::plan::Plan;
 use mimu_rig::record::samples;
 use mimu_rig::rig_file::{RigFile, RigTruth};
-use mimu_rig::unit::TemperatureSensor;
 use mimu_tests::niu::{Row, TABLE_10, TABLE_11};
 use mimu_tests::page::{Block, Table};
 use mimu_thermal::fit::{Estimator, Options, fit};
@@ -26,16 +23,11 @@ use crate::on_bench::{read, session, unit};
 /// Volts per rad/s and per m/s² of the replacement parts, and their volts without input.
 const GAIN: [f64; 2] = [0.2865, 0.08];
 const NULL_V: [f64; 2] = [2.5, 1.65];
-/// Names of the tests as plans for the emulated board.
-const PLANS: [&str; 6] = [
-    "gyro-x", "gyro-y", "gyro-z", "accel-x", "accel-y", "accel-z",
-];
 /// Samples between two temperature updates: 20 ms, a batch of the device.
 const FOLLOW: usize = 2;
 const RATE_HZ: usize = 100;
-/// Length of a test, s, and of a test on the emulated board, which runs at nearly real time.
+/// Length of a test, s.
 const HOUR_S: f64 = 3600.0;
-const QUICK_S: f64 = 1200.0;
 /// Lag of the dies behind the thermometer, s, gyro and accelerometer, as in the rig files.
 const DIE_LAG_S: [f64; 2] = [60.0, 30.0];
 /// deg/h and µg.
@@ -66,7 +58,7 @@ pub fn blocks(_runs: u64) -> Vec<Block> {
     ]);
     let mut lags = Vec::new();
     for (name, rig, printed) in UNITS_TESTED {
-        let file = unit_on_board(rig);
+        let file = unit(&on_board(&read(&format!("rigs/{rig}.toml"))), 1);
         let recorded = session(&read("plans/niu-ramp.toml"), &file, 1);
         let options = Options {
             estimator: Estimator::Joint,
@@ -119,28 +111,6 @@ const UNITS_TESTED: [(&str, &str, &[Row<4>; 6]); 2] = [
     ("NV-IMU100", "niu-nv", &TABLE_11),
 ];
 
-/// Writes rig files and shorter plans for the emulated board into `folder`.
-pub fn write_for_board(folder: &Path) {
-    for (_, rig, _) in UNITS_TESTED {
-        // The device's thermometer is in the dies of its gyros.
-        let mut file = unit_on_board(rig);
-        file.unit.temperature = Some(TemperatureSensor::Dies);
-        file.table.axes = 3;
-        write(folder, &format!("{rig}.toml"), &file.to_toml());
-    }
-    for (k, name) in PLANS.iter().enumerate() {
-        write(folder, &format!("{name}.toml"), &plan(k, QUICK_S));
-    }
-}
-
-fn unit_on_board(rig: &str) -> RigFile {
-    unit(&on_board(&read(&format!("rigs/{rig}.toml"))), 1)
-}
-
-fn write(folder: &Path, name: &str, text: &str) {
-    std::fs::write(folder.join(name), text).expect("a folder to write to");
-}
-
 /// niu's unit behind parts with outputs in volts, with nominal supply and reference, on a table that turns about any axis.
 fn on_board(rig: &str) -> String {
     let matrix =
@@ -175,12 +145,12 @@ fn on_board(rig: &str) -> String {
 
 /// Gyro x, y, z at 10 deg/s about that axis upright, then accelerometer x, y, z at rest with that axis down, as in the text of 5.1. (Table 8 has it
 /// up, which agrees worse with the means of Tables 10 and 11: docs/papers/niu.md.)
-fn plan(test: usize, ramp_s: f64) -> String {
+fn plan(test: usize) -> String {
     let (rate_dps, along) = if test < 3 { (10.0, 1.0) } else { (0.0, -1.0) };
     let up: [f64; 3] = std::array::from_fn(|i| if i == test % 3 { along } else { 0.0 });
     format!(
         "format = \"mimu-plan/1\"\nsample_rate_hz = {RATE_HZ}.0\ncarrier = \"table\"\nlatitude_deg = 30.5\ngravity_mps2 = 9.793\n\
-         chamber_c = [[0.0, -10.0], [{ramp_s:?}, 70.0]]\n[[step]]\nup = {up:?}\nrate_dps = {rate_dps:?}\ndwell_s = {ramp_s:?}\n"
+         chamber_c = [[0.0, -10.0], [{HOUR_S:?}, 70.0]]\n[[step]]\nup = {up:?}\nrate_dps = {rate_dps:?}\ndwell_s = {HOUR_S:?}\n"
     )
 }
 
@@ -190,7 +160,7 @@ fn test(file: &RigFile, stored: &Stored, k: usize) -> Outcome {
     // niu's table has two axes, on which x and y cannot be upright and turn.
     file.table.axes = 3;
     let truth = RigTruth::resolve(&file, 1).expect("a rig");
-    let plan = Plan::parse(Source::new("plan", plan(k, HOUR_S))).expect("a plan");
+    let plan = Plan::parse(Source::new("plan", plan(k))).expect("a plan");
     let compensator = &stored.compensator;
     let mut state = compensator.state(RATE_HZ as f32);
     let mut warm = f64::NAN;

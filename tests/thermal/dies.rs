@@ -5,10 +5,10 @@ use mimu_tests::page::{Block, Table};
 use crate::simulation::Experiment;
 use crate::study::Study;
 
-/// Places of the tables in the document.
-pub const NAMES: [&str; 2] = ["thermal, errors", "thermal, dies"];
+/// Place of the table in the document.
+pub const NAMES: [&str; 1] = ["thermal, dies"];
 
-/// Experiments, as in the second table; the first is also that of the first table.
+/// Experiments, as in the table.
 fn studies() -> [Study; 4] {
     [
         ("lag 60 s", 60.0),
@@ -19,17 +19,8 @@ fn studies() -> [Study; 4] {
     .map(|(name, lag_s)| Study::new(name, Experiment::ramp(lag_s, true)))
 }
 
-/// Both tables, over `runs` runs of each experiment.
+/// The table, over `runs` runs of each experiment.
 pub fn blocks(runs: u64) -> Vec<Block> {
-    let mut errors = Table::new(&[
-        "a whole cycle, lag 60 s",
-        "gyro bias, deg/h",
-        "scale, ppm",
-        "cross terms, ppm",
-        "accel bias, µg",
-        "scale, ppm",
-        "cross terms, ppm",
-    ]);
     let mut dies = Table::new(&[
         "dies",
         "error over bound (bias, scale, cross terms): gyro; accel",
@@ -37,25 +28,8 @@ pub fn blocks(runs: u64) -> Vec<Block> {
         "estimated lag: mean, scatter, mean width of its interval, s",
         "intervals of the lag that contain the truth, %",
     ]);
-    for (k, study) in studies().iter().enumerate() {
+    for study in studies() {
         let found = study.joint(runs);
-        if k == 0 {
-            let rows = [
-                ("joint estimate", found.errors),
-                (
-                    "Cramér-Rao bound of cubics with an unknown lag",
-                    found.bounds,
-                ),
-                (
-                    "joint estimate without a lag",
-                    study.without_lag(runs).errors,
-                ),
-            ];
-            for (name, figures) in rows {
-                let cells = figures.map(|f| format!("{f:.1}"));
-                errors.row([name.to_string()].into_iter().chain(cells));
-            }
-        }
         let six = |figures: [String; 6]| {
             let [a, b, c, d, e, f] = figures;
             format!("{a} {b} {c}; {d} {e} {f}")
@@ -69,6 +43,5 @@ pub fn blocks(runs: u64) -> Vec<Block> {
             format!("{:.1}", found.lag_held),
         ]);
     }
-    let [first, second] = NAMES;
-    vec![Block::table(first, &errors), Block::table(second, &dies)]
+    vec![Block::table(NAMES[0], &dies)]
 }
