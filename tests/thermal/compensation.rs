@@ -4,7 +4,6 @@
 //! encoded and decoded as for the device, and applied in single precision by the code that the firmware runs.
 
 use mimu::quantity::Sensor;
-use mimu::signal::blocks::extent;
 use mimu_core::compensation::Sample;
 use mimu_core::stored::Stored;
 use mimu_device::Image;
@@ -39,24 +38,21 @@ struct Outcome {
     raw: [f64; 2],
     compensated: [f64; 2],
     curves: [f64; 2],
-    range_c: [f64; 2],
 }
 
-/// Places of the tables in the document.
-pub const NAMES: [&str; 2] = ["thermal, compensation", "thermal, compensation, lags"];
+/// Place of the table in the document.
+pub const NAMES: [&str; 1] = ["thermal, compensation"];
 
-/// The tests of both units, and the lags in their calibrations.
+/// The tests of both units.
 pub fn blocks(_runs: u64) -> Vec<Block> {
     let mut table = Table::new(&[
         "unit, test",
         "Table 9",
         "raw",
         "compensated",
-        "share of the mean removed, %",
         "printed, raw",
         "printed, compensated",
     ]);
-    let mut lags = Vec::new();
     for (name, rig, printed) in UNITS_TESTED {
         let file = unit(&on_board(&read(&format!("rigs/{rig}.toml"))), 1);
         let recorded = session(&read("plans/niu-ramp.toml"), &file, 1);
@@ -66,7 +62,6 @@ pub fn blocks(_runs: u64) -> Vec<Block> {
             range_c: None,
         };
         let found = fit(vec![recorded], &[], options).expect("it is fitted");
-        let lags_s = found.joint.profiles.as_ref().map(|p| p.lag.value);
         let calibration = found
             .calibration("2026-01-01T00:00:00Z")
             .expect("it has scale factors");
@@ -81,28 +76,12 @@ pub fn blocks(_runs: u64) -> Vec<Block> {
                 two(o.curves),
                 two(o.raw),
                 format!("{:.1}, {:.0}", o.compensated[0], o.compensated[1]),
-                format!(
-                    "{:.1}",
-                    100.0 * (1.0 - o.compensated[0].abs() / o.raw[0].abs())
-                ),
                 two([*mean_before, *rms_before]),
                 two([*mean, *rms]),
             ]);
         }
-        let [low, high] = extent(outcomes.iter().flat_map(|o| o.range_c));
-        lags.push(format!(
-            "- {name}: lags in the calibration file {:.1} s (gyros) and {:.1} s (accelerometer), {} nodes; dies in the tests at {low:.0} to {high:.0} °C.",
-            lags_s.gyro,
-            lags_s.accel,
-            image.node_temp_c.len()
-        ));
     }
-    let [first, second] = NAMES;
-    let lags = Block {
-        name: second,
-        text: Some(lags.join("\n")),
-    };
-    vec![Block::table(first, &table), lags]
+    vec![Block::table(NAMES[0], &table)]
 }
 
 /// Names, rig files and printed results (Tables 10 and 11).
@@ -166,7 +145,6 @@ fn test(file: &RigFile, stored: &Stored, k: usize) -> Outcome {
     let mut warm = f64::NAN;
     let mut sums = [[0.0; 3]; 2];
     let mut second = ([0.0; 3], 0);
-    let mut range_c = [f64::INFINITY, f64::NEG_INFINITY];
     let mut seconds = 0.0;
     for (n, row) in samples(&plan, &truth, 100 + k as u64)
         .expect("a run")
@@ -210,7 +188,6 @@ fn test(file: &RigFile, stored: &Stored, k: usize) -> Outcome {
             *sum += error * UNITS[sensor];
         }
         second.1 += 1;
-        range_c = [range_c[0].min(warm), range_c[1].max(warm)];
         if second.1 == RATE_HZ {
             for (i, sum) in second.0.iter().enumerate() {
                 let mean = sum / RATE_HZ as f64;
@@ -231,7 +208,6 @@ fn test(file: &RigFile, stored: &Stored, k: usize) -> Outcome {
         raw: of(0),
         compensated: of(1),
         curves: of(2),
-        range_c,
     }
 }
 

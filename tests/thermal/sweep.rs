@@ -12,7 +12,6 @@ use mimu_rig::rig_file::RigFile;
 use mimu_tests::page::{Block, Table};
 use mimu_thermal::fit::{Estimator, Options, ThermalFit, fit};
 use mimu_thermal::row::Row;
-use mimu_thermal::session::Session;
 use nalgebra::{Matrix4, Matrix4x3, SVector};
 use rayon::prelude::*;
 
