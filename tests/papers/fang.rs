@@ -17,6 +17,8 @@ use mimu_tests::page::{Block, Table, significant};
 const RUNS: u64 = 1000;
 /// Standard deviation of a reading, fang (35).
 const SIGMA: f64 = 1e-3;
+/// Readings at each position.
+const READINGS: u32 = 2;
 
 /// How the readings are fitted.
 #[derive(Clone, Copy)]
@@ -59,11 +61,11 @@ fn contenders() -> [Contender; 5] {
 }
 
 impl Contender {
-    fn dwells(&self, truth: &Ideal, readings: u32, random: &mut Random) -> Vec<Observation> {
+    fn dwells(&self, truth: &Ideal, random: &mut Random) -> Vec<Observation> {
         let dwell = |(dwell, up): (usize, &Vector3<f64>)| Observation {
             dwell,
-            raw: truth.read((*up).into(), readings, random).into(),
-            variance: Vector3::repeat(SIGMA * SIGMA / f64::from(readings)),
+            raw: truth.read((*up).into(), READINGS, random).into(),
+            variance: Vector3::repeat(SIGMA * SIGMA / f64::from(READINGS)),
             input: *up,
             earth: EarthShare::NONE,
             change: Vector3::zeros(),
@@ -119,28 +121,21 @@ fn estimate(contender: &Contender, dwells: &[Observation]) -> Forward {
     }
 }
 
-/// Means and scatters of the errors over the runs, with `readings` of `truth` at each position.
-fn monte_carlo(
-    contender: &Contender,
-    truth: &Ideal,
-    of_truth: &[Vector3<f64>; 4],
-    angles: Angles,
-    readings: u32,
-) -> [Errors; 2] {
-    let mut sums = [[[0.0; 3]; 4]; 2];
+/// Mean squared errors over the runs.
+fn monte_carlo(contender: &Contender, truth: &Ideal, of_truth: &[Vector3<f64>; 4]) -> Errors {
+    let mut squares = Errors::default();
     for run in 0..RUNS {
         let mut random = Random::new(run, "fang");
-        let dwells = contender.dwells(truth, readings, &mut random);
-        let found = physical(&estimate(contender, &dwells), angles);
+        let dwells = contender.dwells(truth, &mut random);
+        let found = physical(&estimate(contender, &dwells), Angles::Small);
         for kind in 0..4 {
             for i in 0..3 {
                 let error = found[kind][i] - of_truth[kind][i];
-                sums[0][kind][i] += error / RUNS as f64;
-                sums[1][kind][i] += error * error / RUNS as f64;
+                squares[kind][i] += error * error / RUNS as f64;
             }
         }
     }
-    sums
+    squares
 }
 
 /// Root mean square over the three sensors.
@@ -148,8 +143,9 @@ fn over_axes(squares: &[f64; 3]) -> f64 {
     (squares.iter().sum::<f64>() / 3.0).sqrt()
 }
 
-/// One table: rms errors of all contenders, `readings` at each position.
-fn errors_of(truth: &Ideal, of_truth: &[Vector3<f64>; 4], angles: Angles, readings: u32) -> Table {
+/// Rms errors of all contenders.
+fn errors() -> Table {
+    let (truth, of_truth) = (linear(), table_3());
     let mut table = Table::new(&[
         "scheme and estimator",
         "bias",
@@ -158,7 +154,7 @@ fn errors_of(truth: &Ideal, of_truth: &[Vector3<f64>; 4], angles: Angles, readin
         "non-orthogonality, rad",
     ]);
     for contender in contenders() {
-        let [_, squares] = monte_carlo(&contender, truth, of_truth, angles, readings);
+        let squares = monte_carlo(&contender, &truth, &of_truth);
         let cells = squares.iter().map(|s| significant(over_axes(s)));
         table.row([contender.name.to_string()].into_iter().chain(cells));
     }
@@ -276,7 +272,7 @@ fn biases() -> Table {
         let (mut sum, mut squares) = ([0.0; 12], [0.0; 12]);
         for run in 0..RUNS {
             let mut random = Random::new(run, "fang");
-            let dwells = contender.dwells(&truth, 2, &mut random);
+            let dwells = contender.dwells(&truth, &mut random);
             let found = estimate(contender, &dwells);
             for k in 0..12 {
                 let error = match k {
@@ -297,17 +293,9 @@ fn biases() -> Table {
 
 /// All blocks of this study.
 pub fn blocks() -> Vec<Block> {
-    let unit = linear();
     let block = |name, table| Block::table(name, &table);
     vec![
-        block(
-            "fang, two readings",
-            errors_of(&unit, &table_3(), Angles::Small, 2),
-        ),
-        block(
-            "fang, two thousand readings",
-            errors_of(&unit, &table_3(), Angles::Small, 2000),
-        ),
+        block("fang, two readings", errors()),
         block("fang, mean errors", biases()),
         block("fang, angles", decompositions()),
     ]
