@@ -128,42 +128,6 @@ fn table_3() -> Table {
     table
 }
 
-/// Table 3 before calibration with its misprints corrected: (x, y) has lost the sign of its upper end, and (z, x) and (z, y) are exchanged.
-fn corrected() -> Ends {
-    let mut ends = TABLE_3_BEFORE;
-    ends[0][1][1] = -ends[0][1][1];
-    ends[2].swap(0, 1);
-    ends
-}
-
-/// The middle between the ends is the bias, and half their distance the error of the matrix: both against Table 1.
-fn middles() -> Table {
-    let mut table = Table::new(&[
-        "error of, input about",
-        "half the span, printed",
-        "from Table 1",
-        "middle, printed",
-        "from Table 1",
-        "middle after calibration, printed",
-    ]);
-    let (printed, ours) = (corrected(), ends(&before(&gyro())));
-    let half = |e: [f64; 2]| format!("{:.3}", 0.5 * (e[1] - e[0]));
-    let middle = |e: [f64; 2]| format!("{:.3}", 0.5 * (e[0] + e[1]));
-    for of in 0..3 {
-        for about in 0..3 {
-            table.row([
-                format!("{}, {}", AXES[of], AXES[about]),
-                half(printed[about][of]),
-                half(ours[about][of]),
-                middle(printed[about][of]),
-                middle(ours[about][of]),
-                middle(TABLE_3_AFTER[about][of]),
-            ]);
-        }
-    }
-    table
-}
-
 /// Errors of the offset, axis by axis, for linear gyros and with the square in z.
 fn offsets() -> Table {
     let mut table = Table::new(&[
@@ -233,7 +197,6 @@ pub fn blocks() -> Vec<Block> {
     let block = |name, table| Block::table(name, &table);
     vec![
         block("xu, table 3", table_3()),
-        block("xu, middles", middles()),
         block("xu, offsets", offsets()),
     ]
 }

@@ -39,12 +39,8 @@ pub fn blocks(runs: u64) -> Vec<Block> {
         "recording",
         "h",
         "estimator",
-        "gyro bias, deg/h",
-        "scale, ppm",
-        "cross terms, ppm",
-        "accel bias, µg",
-        "scale, ppm",
-        "cross terms, ppm",
+        "gyro: bias, deg/h; scale, cross terms, ppm",
+        "accel: bias, µg; scale, cross terms, ppm",
         "95 % intervals that contain the truth, %",
     ]);
     let of_soak = |seed| soak::record(LAG_S, seed);
@@ -116,5 +112,6 @@ fn row(
         estimator.to_string(),
     ];
     let cells = errors.map(|e| format!("{e:.1}"));
+    let cells = cells.chunks(3).map(|c| c.join(", "));
     table.row(start.into_iter().chain(cells).chain([held.to_string()]));
 }

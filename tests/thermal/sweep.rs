@@ -77,15 +77,14 @@ fn held(outcomes: &[Outcome], kind: usize) -> String {
 fn units(bare: &[Outcome], stated: &[Outcome]) -> Table {
     let mut table = Table::new(&[
         &format!("{} seeds", bare.len()),
-        "gyro bias, deg/h",
-        "scale, ppm",
-        "cross terms, ppm",
-        "accel bias, µg",
-        "scale, ppm",
-        "cross terms, ppm",
+        "gyro: bias, deg/h; scale, cross terms, ppm",
+        "accel: bias, µg; scale, cross terms, ppm",
     ]);
     let kinds = 0..6;
-    let mut row = |name: String, cells: Vec<String>| table.row([name].into_iter().chain(cells));
+    let mut row = |name: String, cells: Vec<String>| {
+        let cells = cells.chunks(3).map(|c| c.join(", "));
+        table.row([name].into_iter().chain(cells));
+    };
     for (with, outcomes) in [("", bare), ("with `--noise`: ", stated)] {
         let each = |of: fn(&[f64; 2]) -> f64| -> Vec<String> {
             kinds.clone().map(|k| cell(outcomes, k, of)).collect()
@@ -99,15 +98,9 @@ fn units(bare: &[Outcome], stated: &[Outcome]) -> Table {
             format!("{with}95 % intervals that contain the truth, %"),
             kinds.clone().map(|k| held(outcomes, k)).collect(),
         );
-        row(
-            format!("{with}units that are right, of {}", outcomes.len()),
-            {
-                let right = outcomes.iter().filter(|o| o.right).count();
-                let mut cells = vec![String::new(); 6];
-                cells[0] = right.to_string();
-                cells
-            },
-        );
+        let right = outcomes.iter().filter(|o| o.right).count();
+        let name = format!("{with}units that are right, of {}", outcomes.len());
+        row(name, vec![right.to_string()]);
     }
     table
 }
