@@ -131,7 +131,7 @@ fn powers() -> Table {
 
 /// Rows of Tables 10 and 11 whose mean exceeds the root mean square, and differences between section 5.2 and Table 10.
 fn contradictions() -> Table {
-    let mut table = Table::new(&["where", "row", "figure", "and the other"]);
+    let mut table = Table::new(&["row", "one figure", "the other"]);
     for (name, rows) in [("Table 10", &TABLE_10), ("Table 11", &TABLE_11)] {
         for (row, [rms, mean, rms_before, mean_before]) in rows {
             for (of, rms, mean) in [
@@ -139,9 +139,8 @@ fn contradictions() -> Table {
                 ("uncompensated", rms_before, mean_before),
             ] {
                 if mean.abs() > *rms {
-                    let row = format!("{row}, {of}");
-                    let cells = [format!("rms {rms}"), format!("mean {mean}")];
-                    table.row([name.to_string(), row].into_iter().chain(cells));
+                    let row = format!("{name}: rms and mean of {row}, {of}");
+                    table.row([row, format!("{rms}"), format!("{mean}")]);
                 }
             }
         }
@@ -153,9 +152,8 @@ fn contradictions() -> Table {
         ] {
             // A difference in the last digit is rounding.
             if (printed - said).abs() > 0.005 * printed {
-                let cells = [format!("{printed} in Table 10"), format!("{said} in 5.2")];
-                let row = format!("rms of {row}, {of}");
-                table.row(["5.2".to_string(), row].into_iter().chain(cells));
+                let row = format!("Table 10 and 5.2: rms of {row}, {of}");
+                table.row([row, format!("{printed}"), format!("{said}")]);
             }
         }
     }

@@ -38,11 +38,7 @@ struct Outcome {
 
 /// What many runs of one estimator on one experiment give, in the units of the table.
 pub struct Summary {
-    /// Rms errors of the worst axis: bias, scale factors, cross terms of gyro and accelerometer.
-    pub errors: [f64; 6],
-    /// Their Cramér-Rao bounds with an unknown lag.
-    pub bounds: [f64; 6],
-    /// Share of the 95 % intervals that contain the truth, %.
+    /// Share of the 95 % intervals that contain the truth, %: bias, scale factors, cross terms of gyro and accelerometer.
     pub held: [f64; 6],
     /// Mean, scatter and mean interval width of the lag, s.
     pub lag_s: [f64; 3],
@@ -98,8 +94,6 @@ impl Study {
         let mean = |of: &dyn Fn(&Outcome) -> f64| outcomes.iter().map(of).sum::<f64>() / n;
         let lag = mean(&|o| o.lag);
         Summary {
-            errors: rms(&each),
-            bounds: bound(&self.experiment),
             held: shares(&each),
             lag_s: [
                 lag,
