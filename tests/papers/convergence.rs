@@ -168,10 +168,7 @@ fn convergence() -> Table {
         "0.5 s",
         "2 s",
         "2 s, independent readings",
-        "last digit in Table 4",
     ]);
-    // Last digits of Table 4, by kind.
-    let digits = ["0.01", "0.01", "0.01", "0.01"];
     for sensor in [Sensor::Gyro, Sensor::Accel] {
         let rms = |filtered: bool, at: &[usize]| -> Vec<[f64; 4]> {
             let mut squares = vec![[0.0; 4]; at.len()];
@@ -189,10 +186,10 @@ fn convergence() -> Table {
         };
         let real = rms(true, &[RATE_HZ / 10, RATE_HZ / 2, READINGS]);
         let white = rms(false, &[READINGS]);
-        for (kind, digit) in digits.into_iter().enumerate() {
+        for (kind, (name, _)) in KINDS.iter().enumerate() {
             let figures = real.iter().chain(&white).map(|r| significant(r[kind]));
-            let name = format!("{sensor}, {}", KINDS[kind].0);
-            table.row([name].into_iter().chain(figures).chain([digit.to_string()]));
+            let name = format!("{sensor}, {name}");
+            table.row([name].into_iter().chain(figures));
         }
     }
     table

@@ -1,16 +1,12 @@
-//! fang, section 5.1: its Table 3 and noise, with its six and nine positions and with our own designs.
+//! fang, section 5.1: its Table 3 and noise, with six positions and its nine.
 
 use mimu::estimate::known_input::{kalman, least_squares};
 use mimu::estimate::six_positions::six_positions;
 use mimu::estimate::{EarthShare, Estimated, Observation};
-use mimu::plan::design::Problem;
-use mimu::plan::design::model::{Model, Setting, Terms};
-use mimu::plan::design::reach::Fixture;
 use mimu::plan::design::schemes::{FANG_FILTERS, Scheme};
 use mimu::quantity::Sensor;
 use mimu::triad::{Angles, Forward, Physical};
 use mimu_core::kalman::Filter;
-use mimu_recording::Reference;
 use mimu_rig::ideal::{self, FANG_TABLE_3, Ideal};
 use mimu_rig::random::Random;
 use nalgebra::{Matrix3, Vector3};
@@ -21,6 +17,8 @@ use mimu_tests::page::{Block, Table, significant};
 const RUNS: u64 = 1000;
 /// Standard deviation of a reading, fang (35).
 const SIGMA: f64 = 1e-3;
+/// Readings at each position.
+const READINGS: u32 = 2;
 
 /// How the readings are fitted.
 #[derive(Clone, Copy)]
@@ -32,64 +30,42 @@ enum Estimator {
     KalmanOfFour,
 }
 
-/// A scheme, the number of readings in each of its positions relative to the other contenders, and an estimator.
+/// A scheme and an estimator.
 struct Contender {
     name: &'static str,
     positions: Vec<Vector3<f64>>,
-    /// In halves: 2 is the full number.
-    share: u32,
     estimator: Estimator,
 }
 
-fn directions(settings: &[Setting]) -> Vec<Vector3<f64>> {
-    settings.iter().map(|s| s.up).collect()
-}
-
-fn contenders() -> Vec<Contender> {
-    let scheme = |s: Scheme| directions(&s.settings(Sensor::Accel).expect("a scheme of poses"));
-    let (six, nine) = (scheme(Scheme::SixFace), scheme(Scheme::FangNine));
-    let model = Model::accel(Reference::Table, &Terms::default());
-    let problem = Problem::accel(model, Fixture::ThreeAxis).expect("affine on the whole sphere");
-    let ours = directions(&problem.best(9, 1).expect("nine determine four"));
-    let new = |name, positions: &Vec<Vector3<f64>>, share, estimator| Contender {
-        name,
-        positions: positions.clone(),
-        share,
-        estimator,
-    };
-    vec![
-        new("six faces, scale and bias only", &six, 2, Estimator::Scalar),
-        new("six faces, least squares", &six, 2, Estimator::LeastSquares),
-        new(
-            "fang's nine, least squares",
-            &nine,
-            2,
-            Estimator::LeastSquares,
-        ),
-        new("fang's nine, Kalman", &nine, 2, Estimator::Kalman),
-        new(
+fn contenders() -> [Contender; 5] {
+    let [six, nine] = [Scheme::SixFace, Scheme::FangNine].map(|scheme| {
+        let settings = scheme.settings(Sensor::Accel).expect("a scheme of poses");
+        settings.iter().map(|s| s.up).collect::<Vec<_>>()
+    });
+    [
+        ("six faces, scale and bias only", &six, Estimator::Scalar),
+        ("six faces, least squares", &six, Estimator::LeastSquares),
+        ("fang's nine, least squares", &nine, Estimator::LeastSquares),
+        ("fang's nine, Kalman", &nine, Estimator::Kalman),
+        (
             "fang's nine, Kalman, four each",
             &nine,
-            2,
             Estimator::KalmanOfFour,
         ),
-        new("our nine, least squares", &ours, 2, Estimator::LeastSquares),
-        new(
-            "six faces, as long as nine",
-            &six,
-            3,
-            Estimator::LeastSquares,
-        ),
     ]
+    .map(|(name, positions, estimator)| Contender {
+        name,
+        positions: positions.clone(),
+        estimator,
+    })
 }
 
 impl Contender {
-    fn dwells(&self, truth: &Ideal, readings: u32, random: &mut Random) -> Vec<Observation> {
-        let n = readings * self.share / 2;
+    fn dwells(&self, truth: &Ideal, random: &mut Random) -> Vec<Observation> {
         let dwell = |(dwell, up): (usize, &Vector3<f64>)| Observation {
             dwell,
-            raw: truth.read((*up).into(), n, random).into(),
-            variance: Vector3::repeat(SIGMA * SIGMA / f64::from(n)),
+            raw: truth.read((*up).into(), READINGS, random).into(),
+            variance: Vector3::repeat(SIGMA * SIGMA / f64::from(READINGS)),
             input: *up,
             earth: EarthShare::NONE,
             change: Vector3::zeros(),
@@ -145,28 +121,21 @@ fn estimate(contender: &Contender, dwells: &[Observation]) -> Forward {
     }
 }
 
-/// Means and scatters of the errors over the runs, with `readings` of `truth` at each position.
-fn monte_carlo(
-    contender: &Contender,
-    truth: &Ideal,
-    of_truth: &[Vector3<f64>; 4],
-    angles: Angles,
-    readings: u32,
-) -> [Errors; 2] {
-    let mut sums = [[[0.0; 3]; 4]; 2];
+/// Mean squared errors over the runs.
+fn monte_carlo(contender: &Contender, truth: &Ideal, of_truth: &[Vector3<f64>; 4]) -> Errors {
+    let mut squares = Errors::default();
     for run in 0..RUNS {
         let mut random = Random::new(run, "fang");
-        let dwells = contender.dwells(truth, readings, &mut random);
-        let found = physical(&estimate(contender, &dwells), angles);
+        let dwells = contender.dwells(truth, &mut random);
+        let found = physical(&estimate(contender, &dwells), Angles::Small);
         for kind in 0..4 {
             for i in 0..3 {
                 let error = found[kind][i] - of_truth[kind][i];
-                sums[0][kind][i] += error / RUNS as f64;
-                sums[1][kind][i] += error * error / RUNS as f64;
+                squares[kind][i] += error * error / RUNS as f64;
             }
         }
     }
-    sums
+    squares
 }
 
 /// Root mean square over the three sensors.
@@ -174,24 +143,26 @@ fn over_axes(squares: &[f64; 3]) -> f64 {
     (squares.iter().sum::<f64>() / 3.0).sqrt()
 }
 
-/// One table: rms errors of all contenders, `readings` at each position.
-fn errors_of(truth: &Ideal, of_truth: &[Vector3<f64>; 4], angles: Angles, readings: u32) -> Table {
+/// Rms errors of all contenders.
+fn errors() -> Table {
+    let (truth, of_truth) = (linear(), table_3());
     let mut table = Table::new(&[
         "scheme and estimator",
-        "dwells",
         "bias",
         "scale factor",
         "misalignment, rad",
         "non-orthogonality, rad",
+        "largest mean error of P and b, standard errors",
     ]);
     for contender in contenders() {
-        let [_, squares] = monte_carlo(&contender, truth, of_truth, angles, readings);
+        let squares = monte_carlo(&contender, &truth, &of_truth);
         let cells = squares.iter().map(|s| significant(over_axes(s)));
-        let start = [
-            contender.name.to_string(),
-            contender.positions.len().to_string(),
-        ];
-        table.row(start.into_iter().chain(cells));
+        let mean = match contender.estimator {
+            Estimator::Scalar => "-".to_string(),
+            _ => format!("{:.1}", largest_mean_error(&contender, &truth)),
+        };
+        let start = [contender.name.to_string()];
+        table.row(start.into_iter().chain(cells).chain([mean]));
     }
     table
 }
@@ -297,49 +268,30 @@ fn table_3_of_axes() -> [Vector3<f64>; 4] {
 }
 
 /// The largest ratio of mean error to its standard error among all twelve parameters: shows whether an estimator is biased.
-fn biases() -> Table {
-    let mut table = Table::new(&[
-        "scheme and estimator",
-        "largest mean error of P and b, in standard errors of the mean",
-    ]);
-    let truth = linear();
-    for contender in contenders().iter().skip(1) {
-        let (mut sum, mut squares) = ([0.0; 12], [0.0; 12]);
-        for run in 0..RUNS {
-            let mut random = Random::new(run, "fang");
-            let dwells = contender.dwells(&truth, 2, &mut random);
-            let found = estimate(contender, &dwells);
-            for k in 0..12 {
-                let error = match k {
-                    0..9 => found.matrix[(k / 3, k % 3)] - truth.matrix[k / 3][k % 3],
-                    _ => found.bias[k - 9] - truth.bias[k - 9],
-                };
-                sum[k] += error;
-                squares[k] += error * error;
-            }
+fn largest_mean_error(contender: &Contender, truth: &Ideal) -> f64 {
+    let (mut sum, mut squares) = ([0.0; 12], [0.0; 12]);
+    for run in 0..RUNS {
+        let mut random = Random::new(run, "fang");
+        let found = estimate(contender, &contender.dwells(truth, &mut random));
+        for k in 0..12 {
+            let error = match k {
+                0..9 => found.matrix[(k / 3, k % 3)] - truth.matrix[k / 3][k % 3],
+                _ => found.bias[k - 9] - truth.bias[k - 9],
+            };
+            sum[k] += error;
+            squares[k] += error * error;
         }
-        let n = RUNS as f64;
-        let in_errors = (0..12).map(|k| (sum[k] / n).abs() / (squares[k] / n / n).sqrt());
-        let largest = in_errors.fold(0.0, f64::max);
-        table.row([contender.name.to_string(), format!("{largest:.1}")]);
     }
-    table
+    let n = RUNS as f64;
+    let in_errors = (0..12).map(|k| (sum[k] / n).abs() / (squares[k] / n / n).sqrt());
+    in_errors.fold(0.0, f64::max)
 }
 
 /// All blocks of this study.
 pub fn blocks() -> Vec<Block> {
-    let unit = linear();
     let block = |name, table| Block::table(name, &table);
     vec![
-        block(
-            "fang, two readings",
-            errors_of(&unit, &table_3(), Angles::Small, 2),
-        ),
-        block(
-            "fang, two thousand readings",
-            errors_of(&unit, &table_3(), Angles::Small, 2000),
-        ),
-        block("fang, mean errors", biases()),
+        block("fang, two readings", errors()),
         block("fang, angles", decompositions()),
     ]
 }

@@ -4,7 +4,6 @@
 //! document. The check omits the intervals, which take longest and have their own tests; `papers --keep-intervals` writes everything else.
 
 mod convergence;
-mod dwells;
 mod fang;
 mod intervals;
 mod niu;
@@ -39,14 +38,12 @@ fn main() -> ExitCode {
 
 fn run(check: bool, keep_intervals: bool) -> Result<(), Box<dyn std::error::Error>> {
     let written = Pages::read(&PAGES)?;
-    let (dwells, charts) = dwells::blocks();
     let mut blocks: Vec<page::Block> = fang::blocks()
         .into_iter()
         .chain(convergence::blocks())
         .chain(xu::blocks())
         .chain(xu_table_3::blocks())
         .chain(niu::blocks())
-        .chain(dwells)
         .chain(schemes::blocks())
         .collect();
     blocks.extend(match keep_intervals {
@@ -65,9 +62,6 @@ fn run(check: bool, keep_intervals: bool) -> Result<(), Box<dyn std::error::Erro
     }
     let folder = page::docs().join("papers");
     std::fs::create_dir_all(&folder)?;
-    for chart in &charts {
-        chart.draw(&folder)?;
-    }
     for figure in [convergence::figure(), xu_table_3::figure()] {
         figure.draw(&folder)?;
     }

@@ -1,14 +1,6 @@
-//! xu: Table 3 and Figs. 4 to 6, the errors over the rates. They show that the gyro about z is not linear; this file also follows what comes of that.
+//! xu: Table 3 and Figs. 4 to 6, the errors over the rates. They show that the gyro about z is not linear.
 
-use mimu::diagnose::diagnose;
-use mimu::fit::Options;
-use mimu::plan::design::schemes::Scheme;
-use mimu::quantity::Sensor;
-use mimu_rig::located::Source;
 use mimu_rig::random::Random;
-use mimu_rig::rig_file::{EffectFile, RigFile};
-use mimu_rig::table::TableTruth;
-use mimu_tests::bench::recorded;
 use mimu_tests::page::{Block, Table, significant};
 use nalgebra::Vector3;
 
@@ -136,42 +128,6 @@ fn table_3() -> Table {
     table
 }
 
-/// Table 3 before calibration with its misprints corrected: (x, y) has lost the sign of its upper end, and (z, x) and (z, y) are exchanged.
-fn corrected() -> Ends {
-    let mut ends = TABLE_3_BEFORE;
-    ends[0][1][1] = -ends[0][1][1];
-    ends[2].swap(0, 1);
-    ends
-}
-
-/// The middle between the ends is the bias, and half their distance the error of the matrix: both against Table 1.
-fn middles() -> Table {
-    let mut table = Table::new(&[
-        "error of, input about",
-        "half the span, printed",
-        "from Table 1",
-        "middle, printed",
-        "from Table 1",
-        "middle after calibration, printed",
-    ]);
-    let (printed, ours) = (corrected(), ends(&before(&gyro())));
-    let half = |e: [f64; 2]| format!("{:.3}", 0.5 * (e[1] - e[0]));
-    let middle = |e: [f64; 2]| format!("{:.3}", 0.5 * (e[0] + e[1]));
-    for of in 0..3 {
-        for about in 0..3 {
-            table.row([
-                format!("{}, {}", AXES[of], AXES[about]),
-                half(printed[about][of]),
-                half(ours[about][of]),
-                middle(printed[about][of]),
-                middle(ours[about][of]),
-                middle(TABLE_3_AFTER[about][of]),
-            ]);
-        }
-    }
-    table
-}
-
 /// Errors of the offset, axis by axis, for linear gyros and with the square in z.
 fn offsets() -> Table {
     let mut table = Table::new(&[
@@ -184,7 +140,7 @@ fn offsets() -> Table {
         "o_z",
     ]);
     let both = [gyro(), bent()];
-    for k in 0..3 {
+    for k in 0..2 {
         let cells = both.each_ref().map(|experiment| {
             let (sigma, rest) = gyro().noise();
             let mut squares = Vector3::zeros();
@@ -236,87 +192,11 @@ pub fn figure() -> Figure {
     }
 }
 
-/// The unit of `rig/rigs/xu.toml` with this gyro z on the bench, measured by the paper's steps 1 to 6, and diagnosed.
-fn effects() -> Table {
-    let rig = concat!(env!("CARGO_MANIFEST_DIR"), "/../rig/rigs/xu.toml");
-    let text = std::fs::read_to_string(rig).expect("the bench's file");
-    let mut file = RigFile::parse(&Source::new("xu", text)).expect("a rig file");
-    file.table = TableTruth {
-        max_rate_dps: [LARGEST; 3],
-        ..TableTruth::ideal()
-    };
-    let [square, cube, _] = coefficients(&gyro());
-    // The bench gives sizes at 300 deg/s.
-    for (id, size) in [
-        ("gyro_scale_quadratic", square / 12f64.powi(2)),
-        ("gyro_scale_cubic", cube / 12f64.powi(3)),
-    ] {
-        let parameters = format!("dps_at_300dps = [0.0, 0.0, {size:?}]");
-        file.effect.push(EffectFile {
-            id: id.into(),
-            parameters: parameters.parse().expect("TOML"),
-        });
-    }
-    let mut plan =
-        String::from("format = \"mimu-plan/1\"\nsample_rate_hz = 100.0\ncarrier = \"table\"\n");
-    let rates = Scheme::XuRates.settings(Sensor::Gyro).expect("rates");
-    let poses = Scheme::Xu33.settings(Sensor::Accel).expect("poses");
-    for setting in rates.iter().chain(&poses) {
-        let up: [f64; 3] = setting.up.into();
-        let rate_dps = setting.rate.to_degrees();
-        plan += &format!("[[step]]\nup = {up:?}\nrate_dps = {rate_dps:?}\ndwell_s = 10.0\n");
-    }
-    let prepared = recorded(&plan, &file, 1);
-    let found = diagnose(prepared.into(), Options::IN_SAMPLE).expect("diagnosed");
-    let mut table = Table::new(&["gyro", "(z, z), deg/s", "square at 3600 deg/s", "cube"]);
-    let range = |fit: &mimu::fit::Fit| {
-        let model = fit
-            .sensor(Sensor::Gyro)
-            .expect("a gyro")
-            .estimated
-            .triad
-            .inverse;
-        let dwells = fit.prepared.observations(Sensor::Gyro);
-        let errors = dwells.iter().map(|o| {
-            let [input, output] = [o.input, model.apply(&o.raw)].map(|v| v.map(f64::to_degrees));
-            (input.map(f64::round), input - output)
-        });
-        let [low, high] = ends(&errors.collect())[2][2];
-        format!("{low:.3} to {high:.3}")
-    };
-    let size = |id: &str, power: i32| {
-        let one = found.effects.iter().find(|e| e.candidate.id() == id);
-        let value = one.map(|e| e.values[2] * (LARGEST.to_radians()).powi(power));
-        value.map_or("not found".into(), |v| significant(v.to_degrees()))
-    };
-    table.row([
-        "truth".to_string(),
-        "-".into(),
-        significant(square),
-        significant(cube),
-    ]);
-    table.row([
-        "affine".to_string(),
-        range(&found.before),
-        "-".into(),
-        "-".into(),
-    ]);
-    table.row([
-        "with the effects found".to_string(),
-        range(&found.after),
-        size("gyro_scale_quadratic", 2),
-        size("gyro_scale_cubic", 3),
-    ]);
-    table
-}
-
 /// All blocks of this study.
 pub fn blocks() -> Vec<Block> {
     let block = |name, table| Block::table(name, &table);
     vec![
         block("xu, table 3", table_3()),
-        block("xu, middles", middles()),
         block("xu, offsets", offsets()),
-        block("xu, effects", effects()),
     ]
 }

@@ -3,10 +3,7 @@
 //! The units are niu's, behind sensors with outputs in volts, as on the device. `mimu thermal fit` on niu's own ramp makes the calibration. It is
 //! encoded and decoded as for the device, and applied in single precision by the code that the firmware runs.
 
-use std::path::Path;
-
 use mimu::quantity::Sensor;
-use mimu::signal::blocks::extent;
 use mimu_core::compensation::Sample;
 use mimu_core::stored::Stored;
 use mimu_device::Image;
@@ -14,7 +11,6 @@ use mimu_rig::located::Source;
 use mimu_rig::plan::Plan;
 use mimu_rig::record::samples;
 use mimu_rig::rig_file::{RigFile, RigTruth};
-use mimu_rig::unit::TemperatureSensor;
 use mimu_tests::niu::{Row, TABLE_10, TABLE_11};
 use mimu_tests::page::{Block, Table};
 use mimu_thermal::fit::{Estimator, Options, fit};
@@ -26,16 +22,11 @@ use crate::on_bench::{read, session, unit};
 /// Volts per rad/s and per m/s² of the replacement parts, and their volts without input.
 const GAIN: [f64; 2] = [0.2865, 0.08];
 const NULL_V: [f64; 2] = [2.5, 1.65];
-/// Names of the tests as plans for the emulated board.
-const PLANS: [&str; 6] = [
-    "gyro-x", "gyro-y", "gyro-z", "accel-x", "accel-y", "accel-z",
-];
 /// Samples between two temperature updates: 20 ms, a batch of the device.
 const FOLLOW: usize = 2;
 const RATE_HZ: usize = 100;
-/// Length of a test, s, and of a test on the emulated board, which runs at nearly real time.
+/// Length of a test, s.
 const HOUR_S: f64 = 3600.0;
-const QUICK_S: f64 = 1200.0;
 /// Lag of the dies behind the thermometer, s, gyro and accelerometer, as in the rig files.
 const DIE_LAG_S: [f64; 2] = [60.0, 30.0];
 /// deg/h and µg.
@@ -47,26 +38,23 @@ struct Outcome {
     raw: [f64; 2],
     compensated: [f64; 2],
     curves: [f64; 2],
-    range_c: [f64; 2],
 }
 
-/// Places of the tables in the document.
-pub const NAMES: [&str; 2] = ["thermal, compensation", "thermal, compensation, lags"];
+/// Place of the table in the document.
+pub const NAMES: [&str; 1] = ["thermal, compensation"];
 
-/// The tests of both units, and the lags in their calibrations.
+/// The tests of both units.
 pub fn blocks(_runs: u64) -> Vec<Block> {
     let mut table = Table::new(&[
         "unit, test",
         "Table 9",
         "raw",
         "compensated",
-        "share of the mean removed, %",
         "printed, raw",
         "printed, compensated",
     ]);
-    let mut lags = Vec::new();
     for (name, rig, printed) in UNITS_TESTED {
-        let file = unit_on_board(rig);
+        let file = unit(&on_board(&read(&format!("rigs/{rig}.toml"))), 1);
         let recorded = session(&read("plans/niu-ramp.toml"), &file, 1);
         let options = Options {
             estimator: Estimator::Joint,
@@ -74,7 +62,6 @@ pub fn blocks(_runs: u64) -> Vec<Block> {
             range_c: None,
         };
         let found = fit(vec![recorded], &[], options).expect("it is fitted");
-        let lags_s = found.joint.profiles.as_ref().map(|p| p.lag.value);
         let calibration = found
             .calibration("2026-01-01T00:00:00Z")
             .expect("it has scale factors");
@@ -89,28 +76,12 @@ pub fn blocks(_runs: u64) -> Vec<Block> {
                 two(o.curves),
                 two(o.raw),
                 format!("{:.1}, {:.0}", o.compensated[0], o.compensated[1]),
-                format!(
-                    "{:.1}",
-                    100.0 * (1.0 - o.compensated[0].abs() / o.raw[0].abs())
-                ),
                 two([*mean_before, *rms_before]),
                 two([*mean, *rms]),
             ]);
         }
-        let [low, high] = extent(outcomes.iter().flat_map(|o| o.range_c));
-        lags.push(format!(
-            "- {name}: lags in the calibration file {:.1} s (gyros) and {:.1} s (accelerometer), {} nodes; dies in the tests at {low:.0} to {high:.0} °C.",
-            lags_s.gyro,
-            lags_s.accel,
-            image.node_temp_c.len()
-        ));
     }
-    let [first, second] = NAMES;
-    let lags = Block {
-        name: second,
-        text: Some(lags.join("\n")),
-    };
-    vec![Block::table(first, &table), lags]
+    vec![Block::table(NAMES[0], &table)]
 }
 
 /// Names, rig files and printed results (Tables 10 and 11).
@@ -118,28 +89,6 @@ const UNITS_TESTED: [(&str, &str, &[Row<4>; 6]); 2] = [
     ("MTi-G", "niu-mtig", &TABLE_10),
     ("NV-IMU100", "niu-nv", &TABLE_11),
 ];
-
-/// Writes rig files and shorter plans for the emulated board into `folder`.
-pub fn write_for_board(folder: &Path) {
-    for (_, rig, _) in UNITS_TESTED {
-        // The device's thermometer is in the dies of its gyros.
-        let mut file = unit_on_board(rig);
-        file.unit.temperature = Some(TemperatureSensor::Dies);
-        file.table.axes = 3;
-        write(folder, &format!("{rig}.toml"), &file.to_toml());
-    }
-    for (k, name) in PLANS.iter().enumerate() {
-        write(folder, &format!("{name}.toml"), &plan(k, QUICK_S));
-    }
-}
-
-fn unit_on_board(rig: &str) -> RigFile {
-    unit(&on_board(&read(&format!("rigs/{rig}.toml"))), 1)
-}
-
-fn write(folder: &Path, name: &str, text: &str) {
-    std::fs::write(folder.join(name), text).expect("a folder to write to");
-}
 
 /// niu's unit behind parts with outputs in volts, with nominal supply and reference, on a table that turns about any axis.
 fn on_board(rig: &str) -> String {
@@ -175,12 +124,12 @@ fn on_board(rig: &str) -> String {
 
 /// Gyro x, y, z at 10 deg/s about that axis upright, then accelerometer x, y, z at rest with that axis down, as in the text of 5.1. (Table 8 has it
 /// up, which agrees worse with the means of Tables 10 and 11: docs/papers/niu.md.)
-fn plan(test: usize, ramp_s: f64) -> String {
+fn plan(test: usize) -> String {
     let (rate_dps, along) = if test < 3 { (10.0, 1.0) } else { (0.0, -1.0) };
     let up: [f64; 3] = std::array::from_fn(|i| if i == test % 3 { along } else { 0.0 });
     format!(
         "format = \"mimu-plan/1\"\nsample_rate_hz = {RATE_HZ}.0\ncarrier = \"table\"\nlatitude_deg = 30.5\ngravity_mps2 = 9.793\n\
-         chamber_c = [[0.0, -10.0], [{ramp_s:?}, 70.0]]\n[[step]]\nup = {up:?}\nrate_dps = {rate_dps:?}\ndwell_s = {ramp_s:?}\n"
+         chamber_c = [[0.0, -10.0], [{HOUR_S:?}, 70.0]]\n[[step]]\nup = {up:?}\nrate_dps = {rate_dps:?}\ndwell_s = {HOUR_S:?}\n"
     )
 }
 
@@ -190,13 +139,12 @@ fn test(file: &RigFile, stored: &Stored, k: usize) -> Outcome {
     // niu's table has two axes, on which x and y cannot be upright and turn.
     file.table.axes = 3;
     let truth = RigTruth::resolve(&file, 1).expect("a rig");
-    let plan = Plan::parse(Source::new("plan", plan(k, HOUR_S))).expect("a plan");
+    let plan = Plan::parse(Source::new("plan", plan(k))).expect("a plan");
     let compensator = &stored.compensator;
     let mut state = compensator.state(RATE_HZ as f32);
     let mut warm = f64::NAN;
     let mut sums = [[0.0; 3]; 2];
     let mut second = ([0.0; 3], 0);
-    let mut range_c = [f64::INFINITY, f64::NEG_INFINITY];
     let mut seconds = 0.0;
     for (n, row) in samples(&plan, &truth, 100 + k as u64)
         .expect("a run")
@@ -240,7 +188,6 @@ fn test(file: &RigFile, stored: &Stored, k: usize) -> Outcome {
             *sum += error * UNITS[sensor];
         }
         second.1 += 1;
-        range_c = [range_c[0].min(warm), range_c[1].max(warm)];
         if second.1 == RATE_HZ {
             for (i, sum) in second.0.iter().enumerate() {
                 let mean = sum / RATE_HZ as f64;
@@ -261,7 +208,6 @@ fn test(file: &RigFile, stored: &Stored, k: usize) -> Outcome {
         raw: of(0),
         compensated: of(1),
         curves: of(2),
-        range_c,
     }
 }
 

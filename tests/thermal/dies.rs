@@ -5,10 +5,10 @@ use mimu_tests::page::{Block, Table};
 use crate::simulation::Experiment;
 use crate::study::Study;
 
-/// Places of the tables in the document.
-pub const NAMES: [&str; 2] = ["thermal, errors", "thermal, dies"];
+/// Place of the table in the document.
+pub const NAMES: [&str; 1] = ["thermal, dies"];
 
-/// Experiments, as in the second table; the first is also that of the first table.
+/// Experiments, as in the table.
 fn studies() -> [Study; 4] {
     [
         ("lag 60 s", 60.0),
@@ -19,56 +19,26 @@ fn studies() -> [Study; 4] {
     .map(|(name, lag_s)| Study::new(name, Experiment::ramp(lag_s, true)))
 }
 
-/// Both tables, over `runs` runs of each experiment.
+/// The table, over `runs` runs of each experiment.
 pub fn blocks(runs: u64) -> Vec<Block> {
-    let mut errors = Table::new(&[
-        "a whole cycle, lag 60 s",
-        "gyro bias, deg/h",
-        "scale, ppm",
-        "cross terms, ppm",
-        "accel bias, µg",
-        "scale, ppm",
-        "cross terms, ppm",
-    ]);
     let mut dies = Table::new(&[
         "dies",
-        "error over bound (bias, scale, cross terms): gyro; accel",
-        "95 % intervals that contain the truth (same order), %",
+        "95 % intervals that contain the truth (bias, scale, cross terms): gyro; accel, %",
         "estimated lag: mean, scatter, mean width of its interval, s",
         "intervals of the lag that contain the truth, %",
     ]);
-    for (k, study) in studies().iter().enumerate() {
+    for study in studies() {
         let found = study.joint(runs);
-        if k == 0 {
-            let rows = [
-                ("joint estimate", found.errors),
-                (
-                    "Cramér-Rao bound of cubics with an unknown lag",
-                    found.bounds,
-                ),
-                (
-                    "joint estimate without a lag",
-                    study.without_lag(runs).errors,
-                ),
-            ];
-            for (name, figures) in rows {
-                let cells = figures.map(|f| format!("{f:.1}"));
-                errors.row([name.to_string()].into_iter().chain(cells));
-            }
-        }
         let six = |figures: [String; 6]| {
             let [a, b, c, d, e, f] = figures;
             format!("{a} {b} {c}; {d} {e} {f}")
         };
-        let ratios = std::array::from_fn(|k| format!("{:.2}", found.errors[k] / found.bounds[k]));
         dies.row([
             study.name(),
-            six(ratios),
             six(found.held.map(|h| format!("{h:.1}"))),
             found.lag_s.map(|s| format!("{s:.1}")).join(", "),
             format!("{:.1}", found.lag_held),
         ]);
     }
-    let [first, second] = NAMES;
-    vec![Block::table(first, &errors), Block::table(second, &dies)]
+    vec![Block::table(NAMES[0], &dies)]
 }

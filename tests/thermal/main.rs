@@ -9,14 +9,11 @@
 //! | `fang [RUNS]` | fang's soak, with and without misalignments |
 //! | `compensation` | niu's six tests of compensation, by the device's arithmetic |
 //! | `sweep [RUNS]` | poses spread over the sphere while the temperature goes up and down, with the default unit |
-//! | `cooling` | lines against curvature on a recording that only cools |
 //! | `repeatability` | niu's three ramps against his soak both ways |
 //! | `planned [RUNS]` | what `mimu thermal plan --procedure ramp` promises |
-//! | `board FOLDER` | files for the tests of compensation on the emulated board |
 //! | `write [COMMAND ...]` | these tables, or all, into the pages, each with the number of runs of the pages |
 
 mod compensation;
-mod cooling;
 mod dies;
 mod fang;
 mod on_bench;
@@ -28,7 +25,6 @@ mod soak;
 mod study;
 mod sweep;
 
-use std::path::Path;
 use std::process::ExitCode;
 
 use mimu_tests::page::{Block, Pages};
@@ -50,7 +46,7 @@ struct Study {
     blocks: fn(u64) -> Vec<Block>,
 }
 
-const STUDIES: [Study; 8] = [
+const STUDIES: [Study; 7] = [
     Study {
         command: "dies",
         runs: 200,
@@ -82,12 +78,6 @@ const STUDIES: [Study; 8] = [
         blocks: sweep::blocks,
     },
     Study {
-        command: "cooling",
-        runs: 1,
-        names: &cooling::NAMES,
-        blocks: cooling::blocks,
-    },
-    Study {
         command: "planned",
         runs: 8,
         names: &planned::NAMES,
@@ -116,10 +106,6 @@ fn run(arguments: &[String]) -> Result<(), Box<dyn std::error::Error>> {
     let words: Vec<&str> = arguments.iter().map(String::as_str).collect();
     match words.as_slice() {
         ["write", wanted @ ..] => write(wanted),
-        ["board", folder] => {
-            compensation::write_for_board(Path::new(folder));
-            Ok(())
-        }
         [command, runs @ ..] => {
             let study = found(command)?;
             let runs = match runs.first() {
@@ -137,7 +123,7 @@ fn run(arguments: &[String]) -> Result<(), Box<dyn std::error::Error>> {
 }
 
 fn commands() -> String {
-    STUDIES.each_ref().map(|s| s.command).join(", ") + ", board or write"
+    STUDIES.each_ref().map(|s| s.command).join(", ") + " or write"
 }
 
 fn found(command: &str) -> Result<&'static Study, String> {

@@ -33,7 +33,7 @@ fn request() -> Request {
 /// Place of the table in the document.
 pub const NAMES: [&str; 1] = ["thermal, planned"];
 
-/// Predicted and found values of the worst axis.
+/// Found over predicted values of the worst axis, at both ends of the range and between them.
 pub fn blocks(runs: u64) -> Vec<Block> {
     let planned = plan(&request()).expect("a plan");
     let text = to_toml(&planned, request().sample_rate_hz);
@@ -71,17 +71,14 @@ pub fn blocks(runs: u64) -> Vec<Block> {
     // The curves of this unit are cubics, so a fit without noise is the truth.
     let truth = by(session(&text, &noiseless(&file), 1));
     let mut table = Table::new(&[
-        "sensor, temperature",
-        "bias, deg/h or µg: predicted",
-        "found",
-        "scale factor, ppm: predicted",
-        "found",
-        "cross terms, µrad: predicted",
-        "found",
+        "found over predicted at -10, 30, 70 °C",
+        "bias",
+        "scale factor",
+        "cross terms",
     ]);
     for prediction in &planned.sensors {
         let sensor = prediction.sensor as usize;
-        let bias = [180.0 / std::f64::consts::PI * 3600.0, 1e6 / 9.80665][sensor];
+        let mut cells: [Vec<String>; 3] = Default::default();
         for at in &prediction.at {
             let model = |joint: &Joint| {
                 let curves = joint.curves[Sensor::BOTH[sensor]]
@@ -103,21 +100,21 @@ pub fn blocks(runs: u64) -> Vec<Block> {
                 .sum::<SVector<f64, 12>>()
                 / runs as f64;
             let kinds = [
-                (at.bias, &[9, 10, 11][..], bias),
-                (at.scale, &[0, 4, 8], 1e6),
-                (at.cross, &[1, 2, 3, 5, 6, 7], 1e6),
+                (at.bias, &[9, 10, 11][..]),
+                (at.scale, &[0, 4, 8]),
+                (at.cross, &[1, 2, 3, 5, 6, 7]),
             ];
-            let cells = kinds.map(|(promised, kind, unit)| {
-                let relative = |k: usize| unit / gains[if k < 9 { k / 3 } else { k - 9 }];
+            for (cell, (promised, kind)) in cells.iter_mut().zip(kinds) {
+                let relative = |k: usize| 1.0 / gains[if k < 9 { k / 3 } else { k - 9 }];
                 let worst = kind
                     .iter()
                     .map(|k| squares[*k].sqrt() * relative(*k))
                     .fold(0.0, f64::max);
-                [promised.unwrap_or(f64::NAN) * unit, worst].map(|v| format!("{v:.0}"))
-            });
-            let name = format!("{}, {:.0} °C", prediction.sensor, at.temp_c);
-            table.row([name].into_iter().chain(cells.into_iter().flatten()));
+                cell.push(format!("{:.1}", worst / promised.unwrap_or(f64::NAN)));
+            }
         }
+        let cells = cells.map(|c| c.join(", "));
+        table.row([prediction.sensor.to_string()].into_iter().chain(cells));
     }
     vec![Block::table(NAMES[0], &table)]
 }

@@ -235,9 +235,9 @@ impl Scheme {
     }
 }
 
-/// Cramér-Rao bounds of the forward models at `temps`, relative to the gain (SI for b), if the curves are cubics and `lag` tells whether the lag is
-/// unknown too. Gyro and accelerometer; at each temperature P by rows, then b.
-pub fn bounds(experiment: &Experiment, lag: bool, temps: &[f64]) -> [Vec<[f64; 12]>; 2] {
+/// Cramér-Rao bounds of the forward models at `temps`, relative to the gain (SI for b), if the curves are cubics and the lag is unknown too.
+/// Gyro and accelerometer; at each temperature P by rows, then b.
+pub fn bounds(experiment: &Experiment, temps: &[f64]) -> [Vec<[f64; 12]>; 2] {
     const H: f64 = 0.5;
     let other = Experiment {
         lag_s: experiment.lag_s + H,
@@ -284,12 +284,6 @@ pub fn bounds(experiment: &Experiment, lag: bool, temps: &[f64]) -> [Vec<[f64; 1
                 }
             }
         }
-    }
-    if !lag {
-        for k in 0..97 {
-            (information[(96, k)], information[(k, 96)]) = (0.0, 0.0);
-        }
-        information[(96, 96)] = 1.0;
     }
     let scale = information.diagonal().map(|d| 1.0 / d.max(1e-30).sqrt());
     let scaled = DMatrix::from_fn(97, 97, |i, j| information[(i, j)] * scale[i] * scale[j]);

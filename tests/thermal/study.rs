@@ -38,11 +38,7 @@ struct Outcome {
 
 /// What many runs of one estimator on one experiment give, in the units of the table.
 pub struct Summary {
-    /// Rms errors of the worst axis: bias, scale factors, cross terms of gyro and accelerometer.
-    pub errors: [f64; 6],
-    /// Their Cramér-Rao bounds with an unknown lag.
-    pub bounds: [f64; 6],
-    /// Share of the 95 % intervals that contain the truth, %.
+    /// Share of the 95 % intervals that contain the truth, %: bias, scale factors, cross terms of gyro and accelerometer.
     pub held: [f64; 6],
     /// Mean, scatter and mean interval width of the lag, s.
     pub lag_s: [f64; 3],
@@ -66,28 +62,19 @@ impl Study {
 
     /// The joint estimate.
     pub fn joint(&self, runs: u64) -> Summary {
-        self.summary(&self.run(runs, Choice::JOINT))
+        self.summary(&self.run(runs))
     }
 
-    /// The same with the dies' temperature taken to be the thermometer's.
-    pub fn without_lag(&self, runs: u64) -> Summary {
-        let choice = Choice {
-            lag_s: Some(0.0),
-            ..Choice::JOINT
-        };
-        self.summary(&self.run(runs, choice))
-    }
-
-    fn run(&self, runs: u64, choice: Choice) -> Vec<Outcome> {
+    fn run(&self, runs: u64) -> Vec<Outcome> {
         let each = (0..runs).into_par_iter();
-        each.map(|seed| self.once(seed, choice)).collect()
+        each.map(|seed| self.once(seed)).collect()
     }
 
-    fn once(&self, seed: u64, choice: Choice) -> Outcome {
+    fn once(&self, seed: u64) -> Outcome {
         let (manifest, batch) = self.experiment.record(seed);
         let prepared = Prepared::of(manifest, &batch, STILL_FACTOR).expect("it is prepared");
         let session = Session::of(&prepared).expect("its thermometer works");
-        let joint = estimate(&[session], choice).expect("it is estimated");
+        let joint = estimate(&[session], Choice::JOINT).expect("it is estimated");
         self.judge(&joint)
     }
 
@@ -107,8 +94,6 @@ impl Study {
         let mean = |of: &dyn Fn(&Outcome) -> f64| outcomes.iter().map(of).sum::<f64>() / n;
         let lag = mean(&|o| o.lag);
         Summary {
-            errors: rms(&each),
-            bounds: bound(&self.experiment, true),
             held: shares(&each),
             lag_s: [
                 lag,
@@ -171,9 +156,9 @@ pub fn shares(runs: &[&Errors]) -> [f64; 6] {
     })
 }
 
-/// Cramér-Rao bound of `experiment` in the units of the table; `lag` tells whether the lag is unknown too.
-pub fn bound(experiment: &Experiment, lag: bool) -> [f64; 6] {
-    let bound = bounds(experiment, lag, &temps());
+/// Cramér-Rao bound of `experiment` with an unknown lag, in the units of the table.
+pub fn bound(experiment: &Experiment) -> [f64; 6] {
+    let bound = bounds(experiment, &temps());
     worst(&[0, 1].map(|s| bound[s].iter().map(|b| b.map(|v| v * v)).collect()))
 }
 

@@ -1,4 +1,4 @@
-//! `rig/plans/thermal.toml` with units of `rig/rigs/thermal.toml`: one fit per seed, against the truth and against the prediction of the plan.
+//! `rig/plans/thermal.toml` with units of `rig/rigs/thermal.toml`: one fit per seed, against the truth.
 //!
 //! The bench itself gives the truth: the same unit without noise, for a few seconds at each of several temperatures in equilibrium, with six faces
 //! and rates in both directions.
@@ -10,11 +10,8 @@ use mimu_allan::model::FLOOR;
 use mimu_allan::variance::AllanModel;
 use mimu_rig::rig_file::RigFile;
 use mimu_tests::page::{Block, Table};
-use mimu_thermal::basis::Shape;
 use mimu_thermal::fit::{Estimator, Options, ThermalFit, fit};
-use mimu_thermal::regression::{AxisNoise, Normal, Problem};
 use mimu_thermal::row::Row;
-use mimu_thermal::session::Session;
 use nalgebra::{Matrix4, Matrix4x3, SVector};
 use rayon::prelude::*;
 
@@ -33,53 +30,37 @@ const UNITS: [f64; 6] = [
 ];
 /// If the rms of the errors over their standard deviations exceeds this, the standard deviations are wrong.
 const WRONG: f64 = 2.0;
-/// Number of seeds for the variants.
-const FEWER: u64 = 5;
 
 /// Twelve numbers at a temperature of the thermometer.
 type At = (f64, SVector<f64, 12>);
 
-/// Of one seed: for each of the six kinds the errors and their standard deviations, claimed and planned.
+/// Of one seed: for each of the six kinds the errors and their claimed standard deviations.
 struct Outcome {
     /// Whether no kind of standard deviation is wrong.
     right: bool,
-    numbers: [Vec<[f64; 3]>; 6],
+    numbers: [Vec<[f64; 2]>; 6],
 }
 
-/// Places of the tables in the document.
-pub const NAMES: [&str; 2] = ["thermal, sweep", "thermal, sweep, accelerometer"];
+/// Place of the table in the document.
+pub const NAMES: [&str; 1] = ["thermal, sweep"];
 
-/// The tables: `runs` seeds as they are, without and with the noise at rest; fewer of the variants.
+/// The table: `runs` seeds, without and with the noise at rest.
 pub fn blocks(runs: u64) -> Vec<Block> {
     let rig = read("rigs/thermal.toml");
-    let lagging = "[[effect]]\nid = \"gyro_thermal_lag\"\n";
-    let without = rig.replace(lagging, "");
-    assert_ne!(rig, without, "the rig file has the effect");
     let plan = read("plans/thermal.toml");
-    let still = "instability_si = [0.0, 0.0, 0.0]\nwalk_si = [0.0, 0.0, 0.0]\n";
-    let still = format!("[unit.gyro_axes]\n{still}[unit.accel_axes]\n{still}[[effect]]");
-    let white = without.replacen("[[effect]]", &still, 1);
-    let of = |text: &str, stated: bool, runs: u64| -> Vec<Outcome> {
+    let of = |stated: bool| -> Vec<Outcome> {
         let each = (1..=runs).into_par_iter();
-        each.map(|seed| once(&plan, text, stated, seed)).collect()
+        each.map(|seed| once(&plan, &rig, stated, seed)).collect()
     };
-    let [first, second] = NAMES;
-    vec![
-        Block::table(first, &units(&of(&rig, false, runs), &of(&rig, true, runs))),
-        Block::table(
-            second,
-            &variants(&of(&without, false, FEWER), &of(&white, false, FEWER)),
-        ),
-    ]
+    vec![Block::table(NAMES[0], &units(&of(false), &of(true)))]
 }
 
-/// Rms, in figures of the table; `-` if not determined.
-fn cell(outcomes: &[Outcome], kind: usize, of: impl Fn(&[f64; 3]) -> f64) -> String {
+/// Rms, in figures of the table.
+fn cell(outcomes: &[Outcome], kind: usize, of: impl Fn(&[f64; 2]) -> f64) -> String {
     let all = outcomes.iter().flat_map(|o| &o.numbers[kind]);
     let (sum, n) = all.fold((0.0, 0.0), |(s, n), e| (s + of(e).powi(2), n + 1.0));
     let rms: f64 = f64::sqrt(sum / n);
     match rms {
-        x if !x.is_finite() => "-".into(),
         x if x < 10.0 => format!("{x:.1}"),
         x if x < 1000.0 => format!("{x:.0}"),
         x => format!("{:.0}", 100.0 * (x / 100.0).round()),
@@ -88,7 +69,7 @@ fn cell(outcomes: &[Outcome], kind: usize, of: impl Fn(&[f64; 3]) -> f64) -> Str
 
 /// Share of the 95 % intervals that contain the truth, %.
 fn held(outcomes: &[Outcome], kind: usize) -> String {
-    let all: Vec<&[f64; 3]> = outcomes.iter().flat_map(|o| &o.numbers[kind]).collect();
+    let all: Vec<&[f64; 2]> = outcomes.iter().flat_map(|o| &o.numbers[kind]).collect();
     let inside = all.iter().filter(|n| n[0].abs() <= 1.96 * n[1]).count();
     format!("{:.0}", 100.0 * inside as f64 / all.len() as f64)
 }
@@ -96,24 +77,19 @@ fn held(outcomes: &[Outcome], kind: usize) -> String {
 fn units(bare: &[Outcome], stated: &[Outcome]) -> Table {
     let mut table = Table::new(&[
         &format!("{} seeds", bare.len()),
-        "gyro bias, deg/h",
-        "scale, ppm",
-        "cross terms, ppm",
-        "accel bias, µg",
-        "scale, ppm",
-        "cross terms, ppm",
+        "gyro: bias, deg/h; scale, cross terms, ppm",
+        "accel: bias, µg; scale, cross terms, ppm",
     ]);
     let kinds = 0..6;
-    let mut row = |name: String, cells: Vec<String>| table.row([name].into_iter().chain(cells));
+    let mut row = |name: String, cells: Vec<String>| {
+        let cells = cells.chunks(3).map(|c| c.join(", "));
+        table.row([name].into_iter().chain(cells));
+    };
     for (with, outcomes) in [("", bare), ("with `--noise`: ", stated)] {
-        let each = |of: fn(&[f64; 3]) -> f64| -> Vec<String> {
+        let each = |of: fn(&[f64; 2]) -> f64| -> Vec<String> {
             kinds.clone().map(|k| cell(outcomes, k, of)).collect()
         };
         row(format!("{with}rms error"), each(|n| n[0]));
-        if with.is_empty() {
-            let name = "planned by the information matrix of cubics";
-            row(name.into(), each(|n| n[2]));
-        }
         row(
             format!("{with}error over its claimed standard deviation, rms"),
             each(|n| n[0] / n[1]),
@@ -122,42 +98,10 @@ fn units(bare: &[Outcome], stated: &[Outcome]) -> Table {
             format!("{with}95 % intervals that contain the truth, %"),
             kinds.clone().map(|k| held(outcomes, k)).collect(),
         );
-        row(
-            format!("{with}units that are right, of {}", outcomes.len()),
-            {
-                let right = outcomes.iter().filter(|o| o.right).count();
-                let mut cells = vec![String::new(); 6];
-                cells[0] = right.to_string();
-                cells
-            },
-        );
+        let right = outcomes.iter().filter(|o| o.right).count();
+        let name = format!("{with}units that are right, of {}", outcomes.len());
+        row(name, vec![right.to_string()]);
     }
-    table
-}
-
-fn variants(without: &[Outcome], white: &[Outcome]) -> Table {
-    let mut table = Table::new(&[
-        &format!("accelerometer, {FEWER} seeds"),
-        "bias, µg",
-        "scale, ppm",
-        "cross terms, ppm",
-    ]);
-    let accel = 3..6;
-    for (name, outcomes) in [
-        ("without `gyro_thermal_lag`", without),
-        ("without it and without wander of the biases", white),
-    ] {
-        let cells = accel
-            .clone()
-            .map(|k| format!("{}, {} %", cell(outcomes, k, |n| n[0]), held(outcomes, k)));
-        table.row([name.to_string()].into_iter().chain(cells));
-    }
-    let cells = accel.map(|k| cell(white, k, |n| n[2]));
-    table.row(
-        ["planned without wander".to_string()]
-            .into_iter()
-            .chain(cells),
-    );
     table
 }
 
@@ -172,7 +116,7 @@ fn once(plan: &str, rig: &str, stated: bool, seed: u64) -> Outcome {
         lag_s: None,
         range_c: None,
     };
-    match fit(vec![recorded.clone()], &[], options) {
+    match fit(vec![recorded], &[], options) {
         Err(refused) => {
             eprintln!("seed {seed}: refused: {refused}");
             Outcome {
@@ -180,7 +124,7 @@ fn once(plan: &str, rig: &str, stated: bool, seed: u64) -> Outcome {
                 numbers: Default::default(),
             }
         }
-        Ok(found) => judged(&found, &recorded, &file, seed),
+        Ok(found) => judged(&found, &file, seed),
     }
 }
 
@@ -202,11 +146,10 @@ fn at_rest(file: &RigFile, seed: u64) -> [Option<AllanModel>; 6] {
     })
 }
 
-fn judged(found: &ThermalFit, recorded: &Session, file: &RigFile, seed: u64) -> Outcome {
-    let mut numbers: [Vec<[f64; 3]>; 6] = Default::default();
+fn judged(found: &ThermalFit, file: &RigFile, seed: u64) -> Outcome {
+    let mut numbers: [Vec<[f64; 2]>; 6] = Default::default();
     for sensor in Sensor::BOTH {
         let curves = found.joint.curves[sensor].as_ref().expect("recorded");
-        let planned = planned(recorded, file, sensor);
         for (temp_c, truth) in probes(file, sensor, seed) {
             if !(curves.range_c[0]..=curves.range_c[1]).contains(&temp_c) {
                 continue;
@@ -223,15 +166,11 @@ fn judged(found: &ThermalFit, recorded: &Session, file: &RigFile, seed: u64) -> 
                     };
                 let unit = UNITS[kind] / gain;
                 let sigma = covariance[(k, k)].sqrt();
-                numbers[kind].push([
-                    error[k] * unit,
-                    sigma * unit,
-                    planned(k, temp_c) * UNITS[kind],
-                ]);
+                numbers[kind].push([error[k] * unit, sigma * unit]);
             }
         }
     }
-    let wrong = |n: &Vec<[f64; 3]>| {
+    let wrong = |n: &Vec<[f64; 2]>| {
         (n.iter().map(|n| (n[0] / n[1]).powi(2)).sum::<f64>() / n.len() as f64).sqrt() > WRONG
     };
     let names = [
@@ -295,65 +234,4 @@ fn probes(file: &RigFile, sensor: Sensor, seed: u64) -> Vec<At> {
         (temp_c, SVector::<f64, 12>::from_fn(number))
     });
     each.collect()
-}
-
-/// Standard deviation of a number at a temperature, from the information matrix of cubics with the true noise and a lag of zero, relative to the
-/// gain; infinite if the matrix is singular.
-fn planned(recorded: &Session, file: &RigFile, sensor: Sensor) -> impl Fn(usize, f64) -> f64 {
-    let temp = |r: &Row| recorded.thermometer.at(r.middle_s).0;
-    let dies: Vec<f64> = recorded.rows[sensor].iter().map(temp).collect();
-    let range = dies
-        .iter()
-        .fold([f64::INFINITY, f64::NEG_INFINITY], |r, t| {
-            [r[0].min(*t), r[1].max(*t)]
-        });
-    let problem = Problem::new(
-        std::slice::from_ref(recorded),
-        sensor,
-        Shape::Cubic,
-        range,
-        false,
-    )
-    .expect("determined");
-    let axes = match sensor {
-        Sensor::Gyro => &file.unit.gyro_axes,
-        Sensor::Accel => &file.unit.accel_axes,
-    };
-    let of = |key: Option<[f64; 3]>, axis: usize| key.expect("drawn")[axis];
-    let row_s = problem.samples / recorded.rate_hz;
-    let inverses = [0, 1, 2].map(|axis| {
-        let sheet = [axes.white_si, axes.instability_si, axes.walk_si];
-        let noise = AxisNoise::of_densities(sheet.map(|key| of(key, axis)), row_s);
-        let gram = Normal::of(&problem, axis, &dies, &noise, |_| true).gram;
-        let scale = gram.diagonal().map(|d| 1.0 / d.max(1e-300).sqrt());
-        let both = nalgebra::DMatrix::from_diagonal(&scale);
-        let correlation = &both * gram * &both;
-        let least = correlation.symmetric_eigenvalues().min();
-        correlation
-            .try_inverse()
-            .filter(|_| least > 1e-12)
-            .map(|i| &both * i * &both)
-    });
-    move |number, temp_c| {
-        let (axis, input) = if number < 9 {
-            (number / 3, Some(number % 3))
-        } else {
-            (number - 9, None)
-        };
-        let Some(inverse) = &inverses[axis] else {
-            return f64::INFINITY;
-        };
-        let parts = problem.parts(axis);
-        let part = parts
-            .iter()
-            .find(|p| p.input == input)
-            .expect("every curve has a part");
-        let (from, v) = problem.basis(part.kind).values(temp_c);
-        let at = part.from + from;
-        let sum: f64 = (0..4)
-            .flat_map(|i| (0..4).map(move |j| (i, j)))
-            .map(|(i, j)| v[i] * v[j] * inverse[(at + i, at + j)])
-            .sum();
-        sum.sqrt()
-    }
 }

@@ -13,7 +13,7 @@ fn the_figures_of_the_papers_page_come_out_as_they_stand_there() {
     assert!(output.status.success(), "{said}");
 }
 
-/// The table of all items, `docs/papers/coverage.md`.
+/// The list of all items, `docs/papers/coverage.md`.
 fn coverage() -> (PathBuf, String) {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let text = std::fs::read_to_string(root.join("docs/papers/coverage.md")).unwrap();
@@ -49,7 +49,7 @@ fn every_file_test_and_block_in_the_coverage_of_the_papers_exists() {
         }
         text
     });
-    let rows = text.lines().filter(|l| l.starts_with("| "));
+    let rows = text.lines().filter(|l| l.starts_with("- "));
     let (mut files, mut tests, mut blocks) = (0, 0, 0);
     for row in rows {
         for name in row.split('`').skip(1).step_by(2) {
@@ -69,24 +69,24 @@ fn every_file_test_and_block_in_the_coverage_of_the_papers_exists() {
         }
     }
     assert!(
-        files > 50 && tests > 10 && blocks > 40,
+        files > 40 && tests > 10 && blocks > 30,
         "{files} {tests} {blocks}"
     );
 }
 
 #[test]
-fn the_coverage_of_the_papers_counts_its_own_rows() {
+fn the_coverage_of_the_papers_counts_its_own_items() {
     let (_, text) = coverage();
-    let rows = text.lines().filter(|l| l.starts_with("| "));
-    let states: Vec<&str> = rows
-        .filter_map(|l| l.split('|').nth(2))
-        .map(str::trim)
-        .collect();
-    let count = |state: &str| states.iter().filter(|s| **s == state).count();
-    let [whole, part, none] = ["whole", "in part", "not"].map(count);
-    let said = format!(
-        "{} items: {whole} whole, {part} in part, {none} not",
-        whole + part + none
-    );
+    let count = |state: &str| {
+        let heading = format!("\n\n{state}:\n\n");
+        text.split(&heading)
+            .skip(1)
+            .map(|l| l.lines().take_while(|l| l.starts_with("- ")).count())
+            .sum::<usize>()
+    };
+    let [whole, part, none] = ["Whole", "In part", "Not"].map(count);
+    let all = text.lines().filter(|l| l.starts_with("- ")).count();
+    assert_eq!(whole + part + none, all, "items outside the three lists");
+    let said = format!("{all} items: {whole} whole, {part} in part, {none} not");
     assert!(text.contains(&said), "{said}");
 }
