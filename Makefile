@@ -9,7 +9,7 @@ CARGO := cargo +$(TOOLCHAIN)
 FIRMWARE := $(CARGO) build --locked -p mimu-firmware --profile image --target $(TARGET)
 COUNTED := $(CARGO) build --locked -p mimu-counted --profile image --target $(TARGET)
 # All crates whose tests run on the PC. The Python extension module is tested from Python.
-ON_PC := --workspace --exclude mimu-counted --exclude mimu-no-panic
+ON_PC := --workspace --exclude mimu-counted --exclude mimu-no-panic --features mimu-tests/studies
 
 MDBOOK := 0.5.4
 LOWEST := $(shell sed -n 's/^rust-version = "\(.*\)"/\1/p' Cargo.toml)
@@ -20,7 +20,7 @@ PUBLISHED := mimu-core mimu-recording mimu-allan mimu mimu-thermal mimu-device m
 BUILT := $(or $(CARGO_TARGET_DIR),target)/debug/.tests-built
 
 # Stages of `make test`; each can be run alone, as in `make clippy`. Tests are linked before they run, so that both times are shown.
-STAGES := fmt clippy rustdoc images no-panic build-tests run-tests interop python
+STAGES := fmt images no-panic build-tests clippy rustdoc run-tests interop python
 
 .PHONY: help data test $(STAGES) nightly dist book msrv package wheel web web-tests demo faults example station papers blind clumsy bench budget count device fuzz audit toolchain
 
@@ -46,6 +46,10 @@ test: toolchain ## formatting, lints, documentation, firmware, all tests but the
 # A fresh build compiles each crate once, so intermediate results for incremental builds are not needed. The demo and the faults use the builds of the
 # tests: with another setting they would compile the workspace again.
 test $(STAGES) demo faults nightly: export CARGO_INCREMENTAL = 0
+# Clippy's driver compiles as rustc does: libraries, tests, programs and images are linted where they are built. A compile of their own for lints took four
+# minutes of processor time. The flags are those of `cargo clippy -- -D warnings`.
+test $(STAGES) demo faults: export RUSTC_WORKSPACE_WRAPPER = clippy-driver
+test $(STAGES) demo faults: export CLIPPY_ARGS = -D__CLIPPY_HACKERY__warnings__CLIPPY_HACKERY__
 # Tests of devices and of the wizard wait for answers more than they compute: four of them at a time leave two cores no pause.
 test run-tests: export RUST_TEST_THREADS = 4
 # Tests of Python use the extension module that `build-tests` has compiled; `make python` alone builds and tests the wheel.
@@ -54,16 +58,12 @@ test: export MIMU_LIBRARY = $(abspath $(or $(CARGO_TARGET_DIR),target))/debug/li
 fmt:
 	$(CARGO) fmt --all --check
 
-clippy:
-	$(CARGO) clippy --locked $(ON_PC) --exclude mimu-firmware --features mimu-tests/studies --all-targets -- -D warnings
-	$(CARGO) clippy --locked -p mimu-recording --no-default-features -- -D warnings
-	$(CARGO) clippy --locked -p mimu-recording --no-default-features --target $(WEB_TARGET) -- -D warnings
+# With what no other stage compiles.
+clippy: images build-tests
+	$(CARGO) check --locked -p mimu-recording --no-default-features
+	$(CARGO) check --locked -p mimu-recording --no-default-features --target $(WEB_TARGET)
 	@# The page's C libraries are not needed to check Rust: nothing is linked.
-	CC_wasm32_wasip1=true AR_wasm32_wasip1=true $(CARGO) clippy --locked -p mimu-web --target $(WEB_TARGET) -- -D warnings
-	$(CARGO) clippy --locked -p mimu-firmware -p mimu-counted -p mimu-no-panic --profile image --target $(TARGET) -- -D warnings
-	$(CARGO) clippy --locked -p mimu-firmware --profile image --features usb --target $(TARGET) -- -D warnings
-	$(CARGO) clippy --locked -p mimu-firmware --profile image --features matek-h743 --target $(TARGET) -- -D warnings
-	$(CARGO) clippy --locked -p mimu-firmware --profile image --features matek-h743,usb --target $(TARGET) -- -D warnings
+	CC_wasm32_wasip1=true AR_wasm32_wasip1=true $(CARGO) check --locked -p mimu-web --target $(WEB_TARGET)
 
 rustdoc:
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --locked --no-deps
@@ -84,7 +84,7 @@ no-panic:
 
 # With the libraries, so that the extension module for Python is built with the features that the tests need: no crate is compiled twice.
 build-tests:
-	$(CARGO) build --locked $(ON_PC) --lib --tests
+	$(CARGO) build --locked $(ON_PC) --all-targets
 	@touch $(BUILT)
 
 run-tests:
@@ -140,7 +140,7 @@ demo: toolchain ## calibrate and verify a board on the virtual bench; SEED=n is 
 	@if [ $(BOARD) = matek ]; then $(MATEK) && cp $(IMAGES)/mimu-firmware $(IMAGES)/mimu-firmware-matek-h743; fi
 	@$(FIRMWARE)
 	@if [ -e $(BUILT) ] && [ -z "$$(find core host rig tests -name '*.rs' -newer $(BUILT) -print -quit)" ]; \
-	then $(CARGO) build --locked $(ON_PC) --lib --tests; \
+	then $(CARGO) build --locked $(ON_PC) --all-targets; \
 	else $(CARGO) build --locked -p mimu-cli -p mimu-board-tests --bin mimu --bin demo; fi
 	@rm -rf $(DEMO)
 	@target/debug/demo $(SEED) $(DEMO) $(BOARD)

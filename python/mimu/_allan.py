@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 from mimu import _frame, _mimu, _plot
-from mimu._arguments import arguments, calibration_of, several
+from mimu._arguments import CalibrationLike, arguments, calibration_of, several
+from mimu._error import Error
 from mimu._mimu import Noise, Recording
 from mimu._result import Array, Judgement, Message, Result, judged, messages, typed
-
-if TYPE_CHECKING:
-    from mimu._arguments import CalibrationLike
 
 
 @dataclass(frozen=True)
@@ -103,7 +101,17 @@ class Allan(Result):
 
     def plot(self, sensor: Literal["gyro", "accel"] = "gyro", ax: Any = None) -> Any:
         """The deviations of a sensor with their intervals, on axes of matplotlib: on ``ax``, or on axes of its own, which it returns."""
-        return _plot.deviations(self, sensor, ax)
+        channels = [channel for channel in self.channels if channel.name.startswith(sensor)]
+        if not channels:
+            raise Error.of("sensor", f"the noise lacks channels of the {sensor}", "give gyro or accel")
+        ax = _plot.axes(ax)
+        for channel in channels:
+            (line,) = ax.loglog(channel.tau_s, channel.adev, label=channel.name)
+            ax.fill_between(channel.tau_s, channel.lower, channel.upper, color=line.get_color(), alpha=0.2, linewidth=0)
+        ax.set(xlabel="averaging time, s", ylabel=f"deviation, {channels[0].unit}")
+        ax.grid(which="both", alpha=0.3)
+        ax.legend()
+        return ax
 
     def svg(self) -> str:
         """The plot that ``mimu allan --plot`` writes."""

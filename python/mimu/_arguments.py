@@ -4,22 +4,32 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, Protocol, TypeAlias
 
 from mimu import _mimu
 from mimu._mimu import Calibration, Noise, Recording
 
-if TYPE_CHECKING:
-    from mimu._allan import Allan
-    from mimu._diagnosis import Diagnosis
-    from mimu._fit import Fit, SessionsFit
-    from mimu._noise_in_use import NoiseInUse
-    from mimu.thermal import ThermalFit
 
-    #: A calibration, a result that gives one, or a file.
-    CalibrationLike: TypeAlias = Calibration | Fit | SessionsFit | Diagnosis | ThermalFit | str | os.PathLike[str]
-    #: Noise, a result that gives it, or a file.
-    NoiseLike: TypeAlias = Noise | Allan | NoiseInUse | str | os.PathLike[str]
+class GivesCalibration(Protocol):
+    """A result with a calibration: a fit, of one or several sessions or over temperature, or a diagnosis."""
+
+    @property
+    def calibration(self) -> Calibration:
+        """The calibration."""
+
+
+class GivesNoise(Protocol):
+    """A result with noise: by the Allan deviation, or in use."""
+
+    @property
+    def noise(self) -> Noise:
+        """The noise."""
+
+
+#: A calibration, a result that gives one, or a file.
+CalibrationLike: TypeAlias = Calibration | GivesCalibration | str | os.PathLike[str]
+#: Noise, a result that gives it, or a file.
+NoiseLike: TypeAlias = Noise | GivesNoise | str | os.PathLike[str]
 
 Path: TypeAlias = str | os.PathLike[str]
 

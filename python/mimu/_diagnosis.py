@@ -5,17 +5,14 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from mimu import _frame, _mimu
-from mimu._arguments import arguments, calibration_of, kept, noise_of, several
+from mimu import _mimu
+from mimu._arguments import CalibrationLike, NoiseLike, arguments, calibration_of, kept, noise_of, several
 from mimu._error import Error
 from mimu._fit import Keep, Steps
 from mimu._mimu import Calibration, Recording
 from mimu._result import Judgement, Message, Result, judged, messages, typed
-
-if TYPE_CHECKING:
-    from mimu._arguments import CalibrationLike, NoiseLike
 
 
 @dataclass(frozen=True)
@@ -127,7 +124,11 @@ class Diagnosis(Result):
 
     def to_dataframe(self) -> Any:
         """The coefficients as a table of pandas: a row for each, with ``effect``, ``sensor``, ``coefficient``, ``value``, ``sigma`` and ``unit``."""
-        return _frame.of_effects(self.effects)
+        import pandas
+
+        names = ["effect", "sensor", "coefficient", "value", "sigma", "unit"]
+        rows = [(e.id, e.sensor, c.name, c.value, c.sigma, c.unit) for e in self.effects for c in e.coefficients]
+        return pandas.DataFrame(rows, columns=names)
 
     def text(self, *, everything: bool = False) -> str:
         """What ``mimu diagnose`` prints; ``everything`` as with ``--all --next``."""

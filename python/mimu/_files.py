@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, cast
+from typing import Any, Literal, cast
 
 from mimu import _mimu
-from mimu._arguments import Path, arguments, calibration_of, noise_of
+from mimu._arguments import CalibrationLike, NoiseLike, Path, arguments, calibration_of, noise_of
 from mimu._fit import Steps
 from mimu._mimu import Calibration, Noise, Recording
 from mimu._result import Judgement, Message, Result, _Kept, judged, messages, typed
-
-if TYPE_CHECKING:
-    from mimu._arguments import CalibrationLike, NoiseLike
 
 
 def load(path: Path) -> Calibration:

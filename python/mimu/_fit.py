@@ -5,18 +5,16 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, overload
+from typing import Any, Literal, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mimu import _frame, _mimu, _plot
-from mimu._arguments import Path, arguments, kept, noise_of, several
+from mimu import _mimu, _plot
+from mimu._arguments import NoiseLike, Path, arguments, kept, noise_of, several
+from mimu._error import Error
 from mimu._mimu import Calibration, Recording
 from mimu._result import Array, Judgement, Message, Result, judged, messages, typed
-
-if TYPE_CHECKING:
-    from mimu._arguments import NoiseLike
 
 Steps = Literal["given", "found"]
 Sensor = Literal["gyro", "accel"]
@@ -220,14 +218,34 @@ class Fit(Result):
 
     def to_dataframe(self) -> Any:
         """The parameters as a table of pandas: a row for each, with ``sensor``, ``parameter``, ``value``, ``sigma``, ``lower``, ``upper`` and ``unit``."""
-        return _frame.of_parameters({"gyro": self.gyro, "accel": self.accel})
+        import pandas
+
+        rows = [
+            {"sensor": sensor, "parameter": p.name, "value": p.value, "sigma": p.sigma, "lower": p.lower, "upper": p.upper, "unit": p.unit}
+            for sensor, fit in (("gyro", self.gyro), ("accel", self.accel)) if fit is not None for p in fit.parameters.values()
+        ]
+        return pandas.DataFrame(rows)
 
     def plot(self, sensor: Sensor = "accel", ax: Any = None) -> Any:
         """The residual of each dwell or turn with the noise that is due, on axes of matplotlib.
 
         ``sensor`` is ``"gyro"`` or ``"accel"``. Draws on ``ax``, or on axes of its own, and returns them.
         """
-        return _plot.residuals(self, sensor, ax)
+        of = getattr(self, sensor)
+        if of is None:
+            raise Error.of("sensor", f"the fit has no {sensor}", "give one that was fitted")
+        ax = _plot.axes(ax)
+        at = np.arange(len(of.residuals))
+        held = [r.held_out is not None for r in of.residuals]
+        size = [float(np.linalg.norm(r.held_out if r.held_out is not None else r.value)) for r in of.residuals]
+        ax.plot(at, size, "o", label="held out" if all(held) and held else "residual")
+        ax.plot(at, [r.floor for r in of.residuals], "_", color="0.5", label="noise")
+        # A label for each is unreadable beyond a few dozen.
+        every = max(1, len(at) // 20)
+        ax.set_xticks(at[::every], [str(r.step) for r in of.residuals][::every])
+        ax.set(xlabel="dwell", ylabel=f"error of the {sensor}, {of.unit}", yscale="log")
+        ax.legend()
+        return ax
 
     def __str__(self) -> str:
         return self._native.text()

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from mimu._diagnosis import Effect
-    from mimu._fit import SensorFit
-    from mimu._mimu import Recording
+from mimu._mimu import Recording
 
 
 def of_recording(recording: Recording) -> Any:
@@ -26,26 +23,6 @@ def of_recording(recording: Recording) -> Any:
         if (values := getattr(recording, name)) is not None:
             columns |= {named.format(name, axis): values[:, k] for k, axis in enumerate("xyz")}
     return pandas.DataFrame(columns)
-
-
-def of_parameters(sensors: Mapping[str, SensorFit | None]) -> Any:
-    """A row for each parameter of a fit."""
-    import pandas
-
-    rows = [
-        {"sensor": sensor, "parameter": p.name, "value": p.value, "sigma": p.sigma, "lower": p.lower, "upper": p.upper, "unit": p.unit}
-        for sensor, fit in sensors.items() if fit is not None for p in fit.parameters.values()
-    ]
-    return pandas.DataFrame(rows)
-
-
-def of_effects(effects: Sequence[Effect]) -> Any:
-    """A row for each coefficient of the effects."""
-    import pandas
-
-    names = ["effect", "sensor", "coefficient", "value", "sigma", "unit"]
-    rows = [(e.id, e.sensor, c.name, c.value, c.sigma, c.unit) for e in effects for c in e.coefficients]
-    return pandas.DataFrame(rows, columns=names)
 
 
 def of_curves(curves: Sequence[Mapping[str, Any]]) -> Any:

@@ -4,16 +4,12 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from mimu import _mimu
-from mimu._arguments import arguments, calibration_of, noise_of
+from mimu._arguments import CalibrationLike, NoiseLike, arguments, calibration_of, noise_of
 from mimu._fit import Steps
 from mimu._mimu import Noise, Recording
 from mimu._result import Judgement, Message, Result, judged, messages, typed
-
-if TYPE_CHECKING:
-    from mimu._arguments import CalibrationLike, NoiseLike
 
 
 @dataclass(frozen=True)

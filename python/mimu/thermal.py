@@ -5,16 +5,13 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 from mimu import _frame, _mimu, _plot
-from mimu._arguments import arguments, calibration_of, noise_of, several
+from mimu._arguments import CalibrationLike, NoiseLike, arguments, calibration_of, noise_of, several
 from mimu._fit import Steps
 from mimu._mimu import Calibration, Recording
 from mimu._result import Array, Judgement, Message, Result, judged, messages, typed
-
-if TYPE_CHECKING:
-    from mimu._arguments import CalibrationLike, NoiseLike
 
 
 @dataclass(frozen=True)
@@ -106,7 +103,12 @@ class ThermalFit(Result):
 
     def plot(self, parameter: str = "gyro_bias_x", ax: Any = None) -> Any:
         """A curve with its 95 % band, by its name in ``curves``, on axes of matplotlib: on ``ax``, or on axes of its own, which it returns."""
-        return _plot.curve(self.curves[parameter], ax)
+        of = self.curves[parameter]
+        ax = _plot.axes(ax)
+        (line,) = ax.plot(of.temp_c, of.value, label=of.name)
+        ax.fill_between(of.temp_c, of.lower, of.upper, color=line.get_color(), alpha=0.2, linewidth=0)
+        ax.set(xlabel="temperature of the die, °C", ylabel=f"{of.name}, {of.unit}")
+        return ax
 
     def __str__(self) -> str:
         return self._native.text()

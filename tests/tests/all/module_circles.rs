@@ -179,6 +179,43 @@ fn no_modules_depend_on_each_other_in_a_circle() {
     assert!(circles.is_empty(), "circles:\n{}", circles.join("\n"));
 }
 
+/// The modules of one folder in another language, and which they import: their names, separated by commas, follow one of the `words`.
+fn of_folder(folder: &Path, ending: &str, words: &[&str]) -> BTreeMap<String, BTreeSet<String>> {
+    let entries = fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().path());
+    let sources = entries.filter(|path| path.extension().is_some_and(|e| e == ending));
+    let read = |path: PathBuf| {
+        let text = fs::read_to_string(&path).unwrap();
+        let lists = text
+            .lines()
+            .flat_map(|line| words.iter().filter_map(|w| line.split_once(w)));
+        let end = |c: char| !c.is_alphanumeric() && c != '_';
+        let names = lists
+            .flat_map(|(_, list)| list.split(", "))
+            .filter_map(|name| name.split(end).next());
+        let stem = path.file_stem().unwrap().to_str().unwrap().to_owned();
+        (stem, names.map(str::to_owned).collect())
+    };
+    sources.map(read).collect()
+}
+
+#[test]
+fn no_modules_of_the_package_and_of_the_page_depend_on_each_other_in_a_circle() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    for (folder, ending, before) in [
+        ("python/mimu", "py", ["from mimu.", "from mimu import "]),
+        ("web/page", "js", ["from \"./", "import(\"./"]),
+    ] {
+        let modules = of_folder(&root.join(folder), ending, &before);
+        assert!(
+            modules.values().map(BTreeSet::len).sum::<usize>() > 10,
+            "{folder}: {modules:?}"
+        );
+        assert_eq!(circle(&modules), None, "{folder}");
+    }
+}
+
 #[test]
 fn a_circle_is_seen_through_grouped_imports_and_below_a_sibling() {
     let module = |path: &str| -> Module { path.split('/').map(String::from).collect() };

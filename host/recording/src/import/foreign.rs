@@ -8,7 +8,7 @@ use super::broken::{BrokenTally, Fault, Unreadable};
 use super::codes::{Conversion, TwosComplement, Zero};
 use super::counter::{Counter, StampCounter};
 use super::log::{self, is_log};
-use super::options::LogOptions;
+use super::log_options::LogOptions;
 use super::parquet_table::ParquetTable;
 use super::plausibility::Plausibility;
 use super::readings::Readings;

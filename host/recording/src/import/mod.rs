@@ -18,6 +18,7 @@ mod joined;
 pub mod labelled;
 mod left_out;
 mod log;
+mod log_options;
 pub mod look;
 mod options;
 #[cfg(feature = "parquet")]
@@ -68,7 +69,8 @@ pub use copied::CopiedTable;
 pub use faces::Face;
 pub use inputs::Inputs;
 pub use log::is_log;
-pub use options::{ImportOptions, LogOptions};
+pub use log_options::LogOptions;
+pub use options::ImportOptions;
 pub use pose_means::{PoseMean, PoseMeans};
 pub use preset::{Chosen, Preset, PresetUse};
 pub use preview::{Preview, preview};

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::broken::BrokenRows;
 use super::foreign::ForeignFile;
-use super::options::file_name;
+use super::log_options::file_name;
 use super::preset::PresetUse;
 use super::time::TimeSummary;
 use crate::digits::plural;
