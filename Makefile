@@ -20,9 +20,9 @@ PUBLISHED := mimu-core mimu-recording mimu-allan mimu mimu-thermal mimu-device m
 BUILT := $(or $(CARGO_TARGET_DIR),target)/debug/.tests-built
 
 # Stages of `make test`; each can be run alone, as in `make clippy`. Tests are linked before they run, so that both times are shown.
-STAGES := fmt images no-panic build-tests clippy rustdoc run-tests interop python
+STAGES := fmt images no-panic build-tests clippy rustdoc tests
 
-.PHONY: help data test $(STAGES) nightly dist book msrv package wheel web web-tests demo faults example station papers blind clumsy bench budget count device fuzz audit toolchain
+.PHONY: help data test $(STAGES) run-tests interop python nightly dist book msrv package wheel web web-tests demo faults example station papers blind clumsy bench budget count device fuzz audit toolchain
 
 help: ## this list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' Makefile
@@ -45,15 +45,15 @@ test: toolchain ## formatting, lints, documentation, firmware, all tests but the
 
 # A fresh build compiles each crate once, so intermediate results for incremental builds are not needed. The demo and the faults use the builds of the
 # tests: with another setting they would compile the workspace again.
-test $(STAGES) demo faults nightly: export CARGO_INCREMENTAL = 0
+test $(STAGES) run-tests interop demo faults nightly: export CARGO_INCREMENTAL = 0
 # Clippy's driver compiles as rustc does: libraries, tests, programs and images are linted where they are built. A compile of their own for lints took four
 # minutes of processor time. The flags are those of `cargo clippy -- -D warnings`.
-test $(STAGES) demo faults: export RUSTC_WORKSPACE_WRAPPER = clippy-driver
-test $(STAGES) demo faults: export CLIPPY_ARGS = -D__CLIPPY_HACKERY__warnings__CLIPPY_HACKERY__
-# Tests of devices and of the wizard wait for answers more than they compute: four of them at a time leave two cores no pause.
-test run-tests: export RUST_TEST_THREADS = 4
+test $(STAGES) run-tests interop demo faults: export RUSTC_WORKSPACE_WRAPPER = clippy-driver
+test $(STAGES) run-tests interop demo faults: export CLIPPY_ARGS = -D__CLIPPY_HACKERY__warnings__CLIPPY_HACKERY__
+# Tests of devices and of the wizard wait for answers more than they compute.
+test tests run-tests: export RUST_TEST_THREADS = 3
 # Tests of Python use the extension module that `build-tests` has compiled; `make python` alone builds and tests the wheel.
-test: export MIMU_LIBRARY = $(abspath $(or $(CARGO_TARGET_DIR),target))/debug/lib_mimu.so
+test tests: export MIMU_LIBRARY = $(abspath $(or $(CARGO_TARGET_DIR),target))/debug/lib_mimu.so
 
 fmt:
 	$(CARGO) fmt --all --check
@@ -87,8 +87,12 @@ build-tests:
 	$(CARGO) build --locked $(ON_PC) --all-targets
 	@touch $(BUILT)
 
+# Side by side: much of each is waiting.
+tests:
+	$(MAKE) --no-print-directory -j3 --output-sync=target run-tests interop python
+
 run-tests:
-	$(CARGO) test --locked $(ON_PC)
+	python3 tests/run.py $(CARGO) test --locked $(ON_PC)
 
 interop: build-tests
 	./tests/interop/run.sh target/debug/mimu
