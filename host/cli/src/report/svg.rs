@@ -55,14 +55,8 @@ impl Frame {
         let (left, right) = (self.across.start, self.across.end);
         let (top, bottom) = (self.down.start, self.down.end);
         html! {
-            path class="grid" d=(y.iter().fold(String::new(), |mut d, (y, _)| {
-                let _ = write!(d, "M{left:.1} {:.1}H{right:.1}", self.at_y(*y));
-                d
-            })) {}
-            path class="grid" d=(x.iter().fold(String::new(), |mut d, (x, _)| {
-                let _ = write!(d, "M{:.1} {top:.1}V{bottom:.1}", self.at_x(*x));
-                d
-            })) {}
+            path class="grid" d=(y.iter().map(|(y, _)| format!("M{left:.1} {:.1}H{right:.1}", self.at_y(*y))).collect::<String>()) {}
+            path class="grid" d=(x.iter().map(|(x, _)| format!("M{:.1} {top:.1}V{bottom:.1}", self.at_x(*x))).collect::<String>()) {}
             @for (x, label) in x {
                 text class="tick" x=(px(self.at_x(*x))) y=(px(bottom + 14.0)) text-anchor="middle" { (label) }
             }
@@ -144,47 +138,29 @@ impl Frame {
 
     /// Shades every second segment between `ends`.
     pub fn stretches(&self, class: &str, ends: &[f64]) -> Markup {
-        let (top, height) = (self.down.start, self.down.end - self.down.start);
-        let after = ends.get(1..).unwrap_or_default();
-        let right = after.iter().copied().chain([self.x.end]);
-        html! {
-            @for (from, to) in ends.iter().zip(right).step_by(2) {
-                @let (from, to) = (self.at_x(*from), self.at_x(to));
-                rect class=(class) x=(px(from)) y=(px(top)) width=(px(to - from)) height=(px(height)) {}
-            }
-        }
+        let after = ends.iter().skip(1).copied().chain([self.x.end]);
+        let all: Vec<(f64, f64)> = ends.iter().copied().zip(after).step_by(2).collect();
+        self.spans(class, &all)
     }
 
     /// Shades the spans between pairs of abscissas.
     pub fn spans(&self, class: &str, spans: &[(f64, f64)]) -> Markup {
         let (top, height) = (self.down.start, self.down.end - self.down.start);
-        html! {
-            @for (from, to) in spans {
-                @let (from, to) = (self.at_x(*from), self.at_x(*to));
-                rect class=(class) x=(px(from)) y=(px(top)) width=(px(to - from)) height=(px(height)) {}
-            }
-        }
+        html! { @for (from, to) in spans {
+            @let (from, to) = (self.at_x(*from), self.at_x(*to));
+            rect class=(class) x=(px(from)) y=(px(top)) width=(px(to - from)) height=(px(height)) {}
+        } }
     }
 
     /// Class and name of each line, to the right of the heading.
     pub fn legend(&self, entries: &[(&str, &str)]) -> Markup {
-        let widths = entries
-            .iter()
-            .map(|(_, name)| 30.0 + 6.6 * name.chars().count() as f64);
-        let mut left = self.across.end - widths.clone().sum::<f64>();
-        let lefts: Vec<f64> = widths
-            .map(|width| {
-                left += width;
-                left - width
-            })
-            .collect();
+        let width = |(_, name): &(&str, &str)| 30.0 + 6.6 * name.chars().count() as f64;
+        let left = |k: usize| self.across.end - entries[k..].iter().map(width).sum::<f64>();
         let y = self.down.start - 12.0;
-        html! {
-            @for ((class, name), left) in entries.iter().zip(lefts) {
-                path class=(class) d={ "M" (px(left + 6.0)) " " (px(y)) "h14" } {}
-                text class="tick" x=(px(left + 24.0)) y=(px(y + 3.5)) { (name) }
-            }
-        }
+        html! { @for (k, (class, name)) in entries.iter().enumerate() {
+            path class=(class) d={ "M" (px(left(k) + 6.0)) " " (px(y)) "h14" } {}
+            text class="tick" x=(px(left(k) + 24.0)) y=(px(y + 3.5)) { (name) }
+        } }
     }
 
     fn path(
@@ -240,11 +216,8 @@ impl Panel {
 pub fn decades(range: &Range<f64>) -> Vec<(f64, String)> {
     let many = (range.end / range.start).log10() > 2.5;
     let factors: &[i32] = if many { &[1] } else { &[1, 2, 5] };
-    let (low, high) = (
-        range.start.log10().floor() as i32,
-        range.end.log10().ceil() as i32,
-    );
-    let all = (low..=high).flat_map(|power| factors.iter().map(move |f| (*f, power)));
+    let powers = range.start.log10().floor() as i32..=range.end.log10().ceil() as i32;
+    let all = powers.flat_map(|power| factors.iter().map(move |f| (*f, power)));
     let each = all.filter_map(|(factor, power)| {
         let value: f64 = format!("{factor}e{power}").parse().ok()?;
         let label = match power {
@@ -297,15 +270,10 @@ pub fn times_ten(power: i32) -> String {
 
 /// Digits as superscripts.
 pub fn raised(text: &str) -> String {
-    let one = |c: char| match c {
-        '-' => '⁻',
-        '1' => '¹',
-        '2' => '²',
-        '3' => '³',
-        c => c
-            .to_digit(10)
-            .and_then(|d| char::from_u32('⁰' as u32 + d))
-            .unwrap_or(c),
+    let one = |c: char| match c.to_digit(10) {
+        Some(digit) => "⁰¹²³⁴⁵⁶⁷⁸⁹".chars().nth(digit as usize).unwrap_or(c),
+        None if c == '-' => '⁻',
+        None => c,
     };
     text.chars().map(one).collect()
 }
