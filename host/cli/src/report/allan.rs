@@ -67,15 +67,10 @@ fn interval([value, lower, upper]: [f64; 3], unit: &Readable) -> String {
 }
 
 fn coefficients(channels: &[&ChannelResult], level: Level) -> Markup {
-    let units = |term| {
-        channels
-            .iter()
-            .find_map(|c| c.get(term).ok())
-            .map(|c| readable::noise(&c.unit))
-    };
+    let known = |term| channels.iter().find_map(|c| c.get(term).ok());
     let shown = if level.has_all() { usize::MAX } else { 1 };
     html! { (table("Coefficients of the noise with their intervals", &heads(channels), &html! {
-        @for term in Term::ALL { @for unit in units(term).into_iter().flatten().take(shown) { tr {
+        @for term in Term::ALL { @for unit in known(term).into_iter().flat_map(|c| readable::noise(&c.unit)).take(shown) { tr {
             td { (with_unit(term.letter(), &unit)) }
             @for c in channels { td.n { @match c.get(term) {
                 Ok(k) if level.has_all() => (interval([k.value, k.lower, k.upper], &unit)),
@@ -94,10 +89,8 @@ fn coefficients(channels: &[&ChannelResult], level: Level) -> Markup {
 
 /// What the recording was too short or too noisy to show of the three coefficients that a filter needs, and how long to record.
 fn unseen(channels: &[&ChannelResult]) -> Markup {
-    let lost = channels
-        .iter()
-        .find(|c| c.model.is_none())
-        .and_then(|c| c.get(Term::N).err());
+    let lost = channels.iter().find(|c| c.model.is_none());
+    let lost = lost.and_then(|c| c.get(Term::N).err());
     let largest = |values: &mut dyn Iterator<Item = f64>| values.reduce(f64::max);
     html! {
         @if let Some(why) = lost { p { "no coefficients: " (why) } }
@@ -122,10 +115,8 @@ fn unseen(channels: &[&ChannelResult]) -> Markup {
 fn everything(channels: &[&ChannelResult]) -> Markup {
     let unit = &readable::noise(channels[0].unit)[0];
     let scaled = channels.iter().filter(|c| c.raw_unit == Some("SI"));
-    let factors: Vec<String> = scaled
-        .filter_map(|c| c.scale_factor)
-        .map(significant)
-        .collect();
+    let factors = scaled.filter_map(|c| c.scale_factor).map(significant);
+    let factors: Vec<String> = factors.collect();
     html! {
         @if !factors.is_empty() { p { "calibrated: noise of the readings divided by the scale factors " (factors.join(", ")) } }
         p { "deviation, " (unit.unit) "; 95 % bounds in %; in brackets the textbook one-sigma value" }
@@ -214,12 +205,8 @@ fn reasons<'a>(channels: &[&'a ChannelResult]) -> Vec<(String, Vec<&'a str>)> {
         match &channel.model {
             None => said.extend(missing[0].map(|(_, why)| format!("no coefficients: {why}"))),
             Some(model) => {
-                said.extend(
-                    missing
-                        .into_iter()
-                        .flatten()
-                        .map(|(term, why)| format!("{} {why}", term.letter())),
-                );
+                let letter = |(term, why): (Term, &str)| format!("{} {why}", term.letter());
+                said.extend(missing.into_iter().flatten().map(letter));
                 let from = model.range_s[0];
                 let late = from > 1.5 * channel.tau_s.first().copied().unwrap_or(0.0);
                 said.extend(late.then(|| {

@@ -26,16 +26,13 @@ const CLASSES: [&str; 3] = ["x", "y", "z"];
 
 /// The curves of a single recording as SVG.
 pub fn svg(result: &AllanResult) -> String {
-    let drawn = |c: &&ChannelResult| !c.tau_s.is_empty();
-    let of = |sensor: Sensor| -> Vec<&ChannelResult> {
-        let drawn = result.channels.iter().filter(drawn);
-        drawn.filter(|c| c.sensor == sensor).collect()
+    let of = |sensor: Sensor| {
+        let ours = result.channels.iter().filter(|c| c.sensor == sensor);
+        ours.filter(|c| !c.tau_s.is_empty())
+            .collect::<Vec<&ChannelResult>>()
     };
-    let panels = Sensor::BOTH.map(|sensor| (sensor, of(sensor)));
-    let panels: Vec<_> = panels
-        .into_iter()
-        .filter(|(_, channels)| !channels.is_empty())
-        .collect();
+    let mut panels = Sensor::BOTH.map(|sensor| (sensor, of(sensor))).to_vec();
+    panels.retain(|(_, channels)| !channels.is_empty());
     let (width, height) = (PANEL.0 * panels.len() as f64, PANEL.1);
     let drawn = html! {
         svg xmlns="http://www.w3.org/2000/svg" width=(width) height=(height) viewBox={ "0 0 " (width) " " (height) } {
@@ -56,54 +53,51 @@ fn panel(result: &AllanResult, sensor: Sensor, channels: &[&ChannelResult]) -> M
         channels.iter().flat_map(|c| c.adev.iter().map(|d| d * by)),
         1.6,
     );
+    let [log_x, log_y] = [&x, &y].map(|r| r.start.log10()..r.end.log10());
     let frame = Frame {
         across: 92.0..PANEL.0 - 14.0,
         down: 44.0..PANEL.1 - 60.0,
-        x: x.start.log10()..x.end.log10(),
-        y: y.start.log10()..y.end.log10(),
+        x: log_x,
+        y: log_y,
     };
-    let title = if sensor == Sensor::Gyro {
-        "Gyros"
-    } else {
-        "Accelerometers"
-    };
-    let title = format!(
-        "{title} of {}",
-        result.device.as_deref().unwrap_or_default()
-    );
-    let point =
-        |(t, deviation): (&f64, &f64)| (t.log10(), (deviation * by).clamp(y.start, y.end).log10());
+    let inside = |deviation: f64| (deviation * by).clamp(y.start, y.end).log10();
     let curve = |tau_s: &[f64], deviation: &[f64]| -> Vec<(f64, f64)> {
-        tau_s.iter().zip(deviation).map(point).collect()
+        tau_s
+            .iter()
+            .zip(deviation)
+            .map(|(t, d)| (t.log10(), inside(*d)))
+            .collect()
     };
-    // Line style, name and curve of each entry of the legend.
-    let mut entries: Vec<(String, String, Vec<(f64, f64)>)> = Vec::new();
+    // Line style, name and curve of an entry of the legend.
+    type Entry = (String, String, Vec<(f64, f64)>);
+    let mut entries: Vec<Entry> = Vec::new();
     for (class, channel) in CLASSES.iter().zip(channels) {
-        let mut add = |style: &str, name: String, points| {
-            entries.push((format!("{class}{style}"), name, points))
-        };
-        add(
-            "",
+        let (name, tau_s) = (channel.name, &channel.tau_s);
+        entries.push((
+            (*class).into(),
             with_values(channel),
-            curve(&channel.tau_s, &channel.adev),
-        );
-        if let Some(quiet) = &channel.adev_without_lines {
-            add(
-                " quiet",
-                format!("{}, lines removed", channel.name),
-                curve(&channel.tau_s, quiet),
-            );
-        }
-        if let Some(hadamard) = &channel.hadamard {
-            add(
-                " hadamard",
-                format!("{}, Hadamard", channel.name),
-                curve(&hadamard.tau_s, &hadamard.hdev),
-            );
-        }
+            curve(tau_s, &channel.adev),
+        ));
+        let quiet = channel.adev_without_lines.iter();
+        entries.extend(quiet.map(|d| {
+            (
+                format!("{class} quiet"),
+                format!("{name}, lines removed"),
+                curve(tau_s, d),
+            )
+        }));
+        let hadamard = channel.hadamard.iter();
+        entries.extend(hadamard.map(|h| {
+            (
+                format!("{class} hadamard"),
+                format!("{name}, Hadamard"),
+                curve(&h.tau_s, &h.hdev),
+            )
+        }));
     }
     html! {
-        (frame.grid(&title, &decades(&x), &decades(&y), true))
+        @let sensors = if sensor == Sensor::Gyro { "Gyros" } else { "Accelerometers" };
+        (frame.grid(&format!("{sensors} of {}", result.device.as_deref().unwrap_or_default()), &decades(&x), &decades(&y), true))
         path class="axis" d={ "M" (px(frame.across.start)) " " (px(frame.down.start)) "V" (px(frame.down.end)) "H" (px(frame.across.end)) } {}
         (frame.x_name("averaging time, s", &frame))
         (frame.y_name(&format!("{} deviation, {}", result.kind.unwrap_or_default(), usual.unit)))
@@ -157,42 +151,42 @@ fn line_marks(frame: &Frame, channels: &[&ChannelResult], by: f64) -> Markup {
     let mut marks: Vec<(f64, f64)> = Vec::new();
     for (channel, line) in channels
         .iter()
-        .flat_map(|c| c.lines.iter().map(move |line| (c, line)))
+        .flat_map(|c| c.lines.iter().map(move |l| (c, l)))
     {
-        let distance = |t: f64| (t * line.frequency_hz / BENT_AT).ln().abs();
+        let frequency = line.frequency_hz;
+        let distance = |t: &f64| (t * frequency / BENT_AT).ln().abs();
         let each = channel.tau_s.iter().zip(&channel.adev);
-        let Some((_, deviation)) = each.min_by(|a, b| distance(*a.0).total_cmp(&distance(*b.0)))
-        else {
-            continue;
-        };
+        let nearest = each.min_by(|a, b| distance(a.0).total_cmp(&distance(b.0)));
+        let high = nearest.map_or(0.0, |(_, deviation)| deviation * by);
         match marks
             .iter_mut()
-            .find(|(f, _)| (*f / line.frequency_hz).ln().abs() < 0.05)
+            .find(|(f, _)| (*f / frequency).ln().abs() < 0.05)
         {
-            Some((_, high)) => *high = high.max(deviation * by),
-            None => marks.push((line.frequency_hz, deviation * by)),
+            Some((_, highest)) => *highest = highest.max(high),
+            None => marks.push((frequency, high)),
         }
     }
     // From left to right along the falling curve: the highest frequency comes first.
     marks.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let mut placed: Vec<(f64, [f64; 2], [f64; 2])> = Vec::new();
-    for (f, deviation) in marks {
-        let (x, y) = ((BENT_AT / f).log10(), deviation.log10());
-        if !frame.x.contains(&x) || !frame.y.contains(&y) {
-            continue;
-        }
+    let places = marks
+        .iter()
+        .map(|(f, high)| (*f, (BENT_AT / f).log10(), high.log10()));
+    let inside = places.filter(|(_, x, y)| frame.x.contains(x) && frame.y.contains(y));
+    let mut labels: Vec<(f64, f64)> = Vec::new();
+    let mut place = |(f, x, y): (f64, f64, f64)| {
         let (x, y) = (frame.at_x(x), frame.at_y(y) - 5.0);
         // Next to the wedge, but inside the frame, and below labels that are there.
         let left = (x + 6.0).min(frame.across.end - LABEL.0);
         let mut bottom = (y - 4.0).max(frame.down.start + LABEL.1);
-        for (_, _, [other, above]) in &placed {
+        for (other, above) in &labels {
             if (left - other).abs() < LABEL.0 && (bottom - above).abs() < LABEL.1 {
                 bottom = above + LABEL.1;
             }
         }
-        placed.push((f, [x, y], [left, bottom]));
-    }
-    html! { @for (f, [x, y], [left, bottom]) in placed { (wedge(x, y)) text class="tick" x=(px(left)) y=(px(bottom)) { (significant(f)) " Hz" } } }
+        labels.push((left, bottom));
+        html! { (wedge(x, y)) text class="tick" x=(px(left)) y=(px(bottom)) { (significant(f)) " Hz" } }
+    };
+    html! { @for at in inside { (place(at)) } }
 }
 
 /// Marks a coefficient: a circle for each channel, and one letter above the highest circle; their values are in the legend.
@@ -216,14 +210,18 @@ fn marks(frame: &Frame, channels: &[&ChannelResult], term: Term, by: f64) -> Mar
 
 /// The legend is at the upper right, where falling curves leave space: the curves, and what the marks mean.
 fn legend(frame: &Frame, channels: &[&ChannelResult], curves: &[(&str, &str)]) -> Markup {
+    let known = |term| channels.iter().find_map(|c| c.get(term).ok());
     let unit = |term: Term| {
-        channels
-            .iter()
-            .find_map(|c| c.get(term).ok())
-            .map(|c| format!("{} in {}", term.letter(), readable::noise(&c.unit)[0].unit))
+        Some((
+            term.letter(),
+            readable::noise(&known(term)?.unit).remove(0).unit,
+        ))
     };
-    let units: Vec<String> = MARKED.into_iter().filter_map(unit).collect();
-    let units = units.join(", ");
+    let units = MARKED
+        .into_iter()
+        .filter_map(unit)
+        .map(|(letter, unit)| format!("{letter} in {unit}"));
+    let units = units.collect::<Vec<_>>().join(", ");
     let mut key = curves.to_vec();
     if models(channels).next().is_some() {
         key.extend([
@@ -235,12 +233,9 @@ fn legend(frame: &Frame, channels: &[&ChannelResult], curves: &[(&str, &str)]) -
     if channels.iter().any(|c| !c.lines.is_empty()) {
         key.push(("wedge", "lines of the spectrum"));
     }
-    let letters = key
-        .iter()
-        .map(|(_, name)| name.chars().count())
-        .max()
-        .unwrap_or(0);
-    let (width, height) = (46.0 + 7.6 * letters as f64, 10.0 + 18.0 * key.len() as f64);
+    let letters = key.iter().map(|(_, name)| name.chars().count()).max();
+    let width = 46.0 + 7.6 * letters.unwrap_or(0) as f64;
+    let height = 10.0 + 18.0 * key.len() as f64;
     let (left, top) = (frame.across.end - 6.0 - width, frame.down.start + 6.0);
     html! {
         rect class="key" x=(px(left)) y=(px(top)) width=(px(width)) height=(px(height)) {}
@@ -259,10 +254,9 @@ fn legend(frame: &Frame, channels: &[&ChannelResult], curves: &[(&str, &str)]) -
 
 /// Range of positive values, extended by the factor `room`.
 fn ends(values: impl Iterator<Item = f64>, room: f64) -> Range<f64> {
-    let positive = values.filter(|v| v.is_finite() && *v > 0.0);
-    let (low, high) = positive.fold((f64::INFINITY, 0.0f64), |(low, high), v| {
-        (low.min(v), high.max(v))
-    });
+    let positive: Vec<f64> = values.filter(|v| v.is_finite() && *v > 0.0).collect();
+    let low = positive.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = positive.iter().copied().fold(0.0, f64::max);
     if low < high {
         low / room..high * room
     } else {
@@ -272,12 +266,10 @@ fn ends(values: impl Iterator<Item = f64>, room: f64) -> Range<f64> {
 
 /// Channels with a model, and their indices.
 fn models<'a>(
-    channels: &'a [&'a ChannelResult],
+    of: &'a [&ChannelResult],
 ) -> impl Iterator<Item = (usize, &'a ChannelResult, &'a ModelResult)> {
-    channels
-        .iter()
-        .enumerate()
-        .filter_map(|(k, c)| Some((k, *c, c.model.as_ref()?)))
+    let each = of.iter().enumerate();
+    each.filter_map(|(k, c)| Some((k, *c, c.model.as_ref()?)))
 }
 
 /// Averaging time and deviation at which the plot marks a coefficient: N at 1 s, K at 3 s, and B where the model reaches its floor.

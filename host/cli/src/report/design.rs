@@ -90,12 +90,8 @@ fn properties(report: &Design, level: Level) -> Markup {
 /// What limits a design of a limited time.
 fn limit(budget: &Spent) -> Markup {
     let moving = 100.0 * budget.best.moves_s / budget.time_s;
-    let [white, floor, walk] = [
-        budget.shares.white,
-        budget.shares.instability,
-        budget.shares.walk,
-    ]
-    .map(|s| 100.0 * s);
+    let shares = &budget.shares;
+    let [white, floor, walk] = [shares.white, shares.instability, shares.walk].map(|s| 100.0 * s);
     html! {
         dt { "limited by" } dd {
             @match (moving > 50.0, white >= floor.max(walk), floor >= walk) {
@@ -115,12 +111,9 @@ fn ways(budget: &Spent) -> Markup {
     let best = &budget.best;
     let shown = [4, 5, 6, 8, 9, 10, 12, 14, 16, 20, 25, 30, 35, 40];
     let is_best = |w: &Way| w.dwells_a_pass == best.dwells_a_pass;
-    let ways = budget
-        .ways
-        .iter()
-        .filter(|way| is_best(way) || shown.contains(&way.dwells_a_pass));
+    let listed = |way: &&Way| is_best(way) || shown.contains(&way.dwells_a_pass);
     html! { (table("Ways to spend the time", &html! { th { "dwells a pass" } th.n { "passes" } th.n { "dwell, s" } th.n { "moves" } th.n { "sigma over best" } th {} }, &html! {
-        @for way in ways { tr {
+        @for way in budget.ways.iter().filter(listed) { tr {
             td { (way.dwells_a_pass) } td.n { (way.passes) } (number(way.dwell_s, 1.0)) td.n { (format!("{:.0} %", 100.0 * way.moves_s / budget.time_s)) }
             td.n { (format!("{:.3}", way.mean_sigma / best.mean_sigma)) } td { @if is_best(way) { "<" } }
         } }
@@ -213,24 +206,15 @@ fn parameters(report: &Design, level: Level) -> Markup {
     } else {
         PARAMETERS
     };
-    let cells = report
-        .sigma_per_parameter
-        .iter()
-        .map(|p| match p.data_sheet.half_width_95 {
-            half if half.is_finite() => {
-                let alone = p
-                    .data_sheet
-                    .population_half_width_95
-                    .map_or_else(String::new, prior::alone);
-                format!(
-                    "{} ± {} {}{alone}",
-                    p.name,
-                    significant(half),
-                    p.data_sheet.unit
-                )
-            }
-            _ => format!("{} undetermined", p.name),
-        });
+    let cells = report.sigma_per_parameter.iter().map(|p| {
+        let sheet = &p.data_sheet;
+        let (name, half, unit) = (&p.name, significant(sheet.half_width_95), &sheet.unit);
+        let alone = sheet.population_half_width_95.map(prior::alone);
+        match sheet.half_width_95.is_finite() {
+            true => format!("{name} ± {half} {unit}{}", alone.unwrap_or_default()),
+            false => format!("{name} undetermined"),
+        }
+    });
     let cells: Vec<String> = cells.collect();
     let width = 2 + cells.iter().map(|c| c.chars().count()).max().unwrap_or(0);
     let across = (columns() / width).clamp(1, 3);
@@ -252,10 +236,9 @@ fn parameters(report: &Design, level: Level) -> Markup {
 
 /// Parameters that the dwells hardly show. Beside a prior they have the half-width in brackets.
 fn weak(report: &Design) -> Markup {
-    let weak = report
-        .sigma_per_parameter
-        .iter()
-        .filter(|p| report.prior.is_none() && p.inflation >= WEAK && p.value.is_finite());
+    let weak = report.sigma_per_parameter.iter();
+    let weak =
+        weak.filter(|p| report.prior.is_none() && p.inflation >= WEAK && p.value.is_finite());
     html! { ul class="lines" data-head="warning: " { @for p in weak {
         li { (p.name) " is hardly observable: sigma " (significant(p.inflation)) " times that with the others known" }
     } } }
@@ -264,22 +247,16 @@ fn weak(report: &Design) -> Markup {
 /// Result of `mimu design --compare`: one line per design.
 pub fn comparison_text(comparison: &Comparison) -> String {
     let noticed = |design: &Design| {
-        let names: Vec<&str> = design
-            .notices
-            .iter()
-            .filter(|n| n.noticed == n.parameters)
-            .map(|n| n.term)
-            .collect();
+        let all = design.notices.iter().filter(|n| n.noticed == n.parameters);
+        let names: Vec<&str> = all.map(|n| n.term).collect();
         match names.len() {
             0 => "-".into(),
             all if all > 1 && all == design.notices.len() => "all terms".into(),
             _ => names.join(", "),
         }
     };
-    let assumed = comparison
-        .designs
-        .iter()
-        .filter_map(|design| Some((design.scheme?, design.assumed?)));
+    let assumed = comparison.designs.iter();
+    let assumed = assumed.filter_map(|design| Some((design.scheme?, design.assumed?)));
     text(&html! {
         @if let Some(first) = comparison.designs.first() {
             p { (first.subject()) ": " (significant(first.dwell_s)) " s a dwell" }

@@ -176,19 +176,14 @@ fn line(count: &LineCount) -> Markup {
 /// Result of `mimu device stream`, without the samples.
 pub fn stream_text(result: &DeviceResult<Streamed>) -> String {
     let found = &result.found;
-    let places: Vec<String> = found
-        .thermometers
-        .iter()
-        .map(|t| format!("{} {:.2} °C", t.place, t.temp_c))
-        .collect();
     text(&html! {
         p { (result.port) ": " (found.samples) " samples, " (found.missing) " missing, " (format!("{:.2} °C", found.temp_c)) }
         @for (sensor, moments) in [("gyro", &found.gyro), ("accel", &found.accel)] { @for (i, axis) in AXES.iter().enumerate() {
             pre { (format!("{sensor:<5} {axis}  mean {:>13.6}  deviation {:>9} {}", moments.mean[i], significant(moments.deviation[i]), printed(&moments.unit))) }
         } }
-        @if !places.is_empty() { p { "thermometers: " (places.join(", ")) } }
+        @if !found.thermometers.is_empty() { p { "thermometers: " @for (k, t) in found.thermometers.iter().enumerate() { @if k > 0 { ", " } (t.place) (format!(" {:.2} °C", t.temp_c)) } } }
         (line(&found.line))
-        (all_warnings(&found.flagged.warnings()))
+        (all_warnings(found.flagged.warnings()))
     })
 }
 
@@ -200,22 +195,6 @@ fn printed(unit: &str) -> String {
 /// Result of `mimu record`.
 pub fn record_text(summary: &RecordSummary) -> String {
     let s = &summary.state;
-    let restarts = s
-        .restarts
-        .iter()
-        .map(|r| format!("the device restarted before {:.3} s: {}", r.t_s, r.start));
-    let back = (s.reconnected > 0).then(|| {
-        format!(
-            "the port vanished and came back {} times: the samples in between are missing",
-            s.reconnected
-        )
-    });
-    let flagged = s.flagged.warnings();
-    let warnings: Vec<String> = restarts
-        .chain(s.warnings.iter().cloned())
-        .chain(back)
-        .chain(flagged.iter().map(ToString::to_string))
-        .collect();
     text(&html! {
         p {
             (summary.port) (format!(": {} samples from {:.3} to {:.3} s", s.samples, s.first_s.unwrap_or_default(), s.last_s.unwrap_or_default()))
@@ -223,7 +202,12 @@ pub fn record_text(summary: &RecordSummary) -> String {
         }
         @if s.dwells > 0 { p { "dwells: " (s.dwells) } }
         (line(&s.line))
-        (all_warnings(&warnings))
+        ul.lines data-head="warning: " {
+            @for r in &s.restarts { li { (format!("the device restarted before {:.3} s: {}", r.t_s, r.start)) } }
+            @for warning in &s.warnings { li { (warning) } }
+            @if s.reconnected > 0 { li { "the port vanished and came back " (s.reconnected) " times: the samples in between are missing" } }
+            @for warning in s.flagged.warnings() { li { (warning) } }
+        }
         p { "recording: " (summary.recording) }
     })
 }
@@ -259,7 +243,7 @@ pub fn kalman_text(result: &DeviceResult<KalmanRun>) -> String {
         }
         (table("Estimates of the device and of the PC", &html! { th {} th.n { "device" } th.n { "sigma" } th.n { "PC" } th.n { "difference / sigma" } th { "unit" } }, &html! {
             @for (i, axis) in AXES.iter().enumerate() { @for (k, (name, unit)) in run.parameters.iter().zip(&run.units).enumerate() { tr {
-                td { (axis) " " (name) } td.n { (format!("{:.7}", run.device[i].mean[k])) } (number(run.device[i].sigma[k].into(), 1.0))
+                td { (axis) " " (name) } td.n { (format!("{:.7}", run.device[i].mean[k])) } (number(run.device[i].sigma[k], 1.0))
                 td.n { (format!("{:.7}", run.host[i].mean[k])) } (number(run.distance_sigma[i][k], 1.0)) td { (unit) }
             } } }
         }))

@@ -18,7 +18,7 @@ use mimu_recording::Reference;
 use mimu_recording::error::{Error, Result};
 
 use super::page::{Level, Made, judged, kinds, page, problems, quantity, shown, spoken, written};
-use super::table::{known, number, table, with_unit};
+use super::table::{number, table, with_unit};
 use super::terminal::text;
 use crate::hint;
 
@@ -75,7 +75,7 @@ pub(super) fn body(d: &DiagnosisResult, made: &Made) -> Result<Markup> {
         (tried(d, Level::Page, true))
         (recorded(d))
         (method())
-        (made.line(&d.tool))
+        (made.line(d.tool))
     })
 }
 
@@ -161,7 +161,7 @@ pub(super) fn errors(d: &DiagnosisResult, level: Level) -> Markup {
         }, &html! { @for (name, s) in d.sensors.present() { @for (label, [rms, held_out], after) in steps(d, name, s, level) { tr {
             @let unit = readable::error(s.unit);
             td { (with_unit(label, &unit)) }
-            @for rms in [rms, held_out] { (known(Some(rms).filter(|_| s.says_anything()), unit.factor)) }
+            @for rms in [rms, held_out] { (number(if s.says_anything() { rms } else { f64::NAN }, unit.factor)) }
             // The noise floor is known even if the residuals are not informative.
             (number(s.noise_floor, unit.factor))
             @if let Some(of) = beside.and_then(|second| if after { &second.after } else { &second.before }.sensors[name].as_ref()) {
@@ -280,9 +280,8 @@ fn residuals(d: &DiagnosisResult, name: Sensor, level: Level) -> Markup {
             _ => groups.push(vec![l]),
         }
     }
-    let listed = groups
-        .len()
-        .min(if level.has_all() { usize::MAX } else { LISTED });
+    let most = if level.has_all() { usize::MAX } else { LISTED };
+    let listed = groups.len().min(most);
     html! {
         @for group in &groups[..listed] {
             @let rows: Vec<String> = group.iter().map(|l| l.stratum.to_string()).collect();

@@ -7,14 +7,14 @@ use mimu::fit::Split;
 use mimu::judge::input;
 use mimu::judgement::JudgementKind;
 use mimu::parameter::ParameterKind;
-use mimu::quantity::{AXES, Sensor, plural, plus_minus, significant};
+use mimu::quantity::{Sensor, plural, plus_minus, significant};
 use mimu::readable::{self, Readable};
 use mimu::result::fit::{DwellResult, FitResult, Parameter, SensorFitResult};
 use mimu::warning::Warning;
 use mimu_recording::Reference;
 
 use super::page::{Level, judged, kinds, problems, warnings};
-use super::table::{interval, known, number, table, with_unit};
+use super::table::{by_axes, interval, known, number, table, with_unit};
 use super::terminal::text;
 use crate::hint;
 
@@ -163,7 +163,7 @@ fn parameters(fit: &FitResult, name: Sensor, sensor: &SensorFitResult) -> Markup
     let by_choice = fit.reference == Reference::TurntableRate
         || fit.reference == Reference::Gravity && name == Sensor::Accel;
     let free = |kind: &ParameterKind| !(*kind == ParameterKind::Misalignment && by_choice);
-    html! { (table("Parameters with 95 % intervals", &html! { th { (name) ", ± of 95 %" } @for axis in AXES { th.n { (axis) } } }, &html! {
+    html! { (by_axes("Parameters with 95 % intervals", &html! { (name) ", ± of 95 %" }, &html! {
         @for kind in ParameterKind::PHYSICAL.into_iter().filter(free) {
             @let triple: Vec<&Parameter> = sensor.of_kind(kind).collect();
             @if let Some(first) = triple.first() {

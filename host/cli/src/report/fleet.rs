@@ -116,41 +116,23 @@ fn lists(fleet: &Fleet) -> Markup {
         new
     });
     let different: Vec<Markup> = different.map(level).collect();
-    let signals = fleet
-        .drift
-        .iter()
-        .flat_map(|d| &d.charts)
-        .filter(|c| c.signal.is_some());
-    let contradicting = fleet
-        .contradicting
-        .iter()
-        .map(|one| html! { (one.files.join(", ")) " of " (unit(one)) });
-    let all: [(&str, Vec<Markup>); 6] = [
-        (
-            "units that do not belong",
-            fleet.strangers.iter().map(unit).collect(),
-        ),
-        (
-            "calibrations that contradict others of their unit",
-            contradicting.collect(),
-        ),
-        (
-            "units measured on many days that change",
-            fleet.changed_units.iter().map(changed_unit).collect(),
-        ),
-        ("labels that differ", different),
-        (
-            "labels that changed",
-            fleet.changed.iter().map(changed).collect(),
-        ),
-        ("parameters that drift", signals.map(since).collect()),
-    ];
-    let found = || all.iter().filter(|(_, items)| !items.is_empty());
-    let shown = if found().count() > FEW_LISTS { 1 } else { 2 };
-    html! { @for (what, items) in found() {
-        p { (what) ": " (items.len()) @if items.len() > shown { " (--verbose)" } }
-        section { @for item in items.iter().take(shown) { p { (item) } } }
-    } }
+    html! {
+        @let of_files = |one: &Stranger| html! { (one.files.join(", ")) " of " (unit(one)) };
+        @let all: [(&str, Vec<Markup>); 6] = [
+            ("units that do not belong", fleet.strangers.iter().map(unit).collect()),
+            ("calibrations that contradict others of their unit", fleet.contradicting.iter().map(of_files).collect()),
+            ("units measured on many days that change", fleet.changed_units.iter().map(changed_unit).collect()),
+            ("labels that differ", different),
+            ("labels that changed", fleet.changed.iter().map(changed).collect()),
+            ("parameters that drift", fleet.drift.iter().flat_map(|d| &d.charts).filter(|c| c.signal.is_some()).map(since).collect()),
+        ];
+        @let found = || all.iter().filter(|(_, items)| !items.is_empty());
+        @let shown = if found().count() > FEW_LISTS { 1 } else { 2 };
+        @for (what, items) in found() {
+            p { (what) ": " (items.len()) @if items.len() > shown { " (--verbose)" } }
+            section { @for item in items.iter().take(shown) { p { (item) } } }
+        }
+    }
 }
 
 fn unit(one: &Stranger) -> Markup {
@@ -196,23 +178,22 @@ fn worst(gage: &GageStudy) -> Option<String> {
     let all = || gage.parameters.iter();
     let by_tolerance = all().filter_map(|p| Some((p, p.share_of_tolerance?, "tolerance")));
     let by_variation = all().map(|p| (p, p.share_of_variation, "variation"));
-    let largest =
-        |a: &(&GageOfParameter, f64, &str), b: &(&GageOfParameter, f64, &str)| a.1.total_cmp(&b.1);
-    let (worst, share, of) = by_tolerance
+    type Share<'a> = (&'a GageOfParameter, f64, &'a str);
+    let largest = |a: &Share, b: &Share| a.1.total_cmp(&b.1);
+    let worst = by_tolerance
         .max_by(largest)
-        .or_else(|| by_variation.max_by(largest))?;
-    let (share, name) = (
-        significant(100.0 * share),
-        parameter(worst.sensor, &worst.name),
-    );
-    Some(format!("at most {share} % of the {of} ({name})"))
+        .or_else(|| by_variation.max_by(largest));
+    let (worst, share, of) = worst?;
+    let name = parameter(worst.sensor, &worst.name);
+    Some(format!(
+        "at most {} % of the {of} ({name})",
+        significant(100.0 * share)
+    ))
 }
 
 fn capability(fleet: &Fleet, part: &str, level: Level) -> Markup {
-    let worst = fleet
-        .capability
-        .iter()
-        .min_by(|a, b| a.cpk.total_cmp(&b.cpk));
+    let all = fleet.capability.iter();
+    let worst = all.min_by(|a, b| a.cpk.total_cmp(&b.cpk));
     html! {
         @if level.has_all() { h2 id="capability" { "Capability" } }
         @match worst {

@@ -2,10 +2,10 @@
 
 use maud::{Markup, html};
 use mimu::in_use::{Estimate, NoiseInUse};
-use mimu::quantity::{AXES, Sensor, significant};
+use mimu::quantity::{Sensor, significant};
 
 use super::page::{all_warnings, judged};
-use super::table::{between, interval, known, number, table};
+use super::table::{between, by_axes, interval, known, number, table};
 use super::terminal::text;
 
 /// Result of `mimu noise`.
@@ -35,7 +35,7 @@ pub(super) fn document(result: &NoiseInUse) -> Markup {
 /// Biases, and how the trajectory is mounted and timed.
 fn estimates(result: &NoiseInUse) -> Markup {
     let row = |name: &str, own: &[Estimate], factor: f64| html! { tr { td { (name) } @for own in own { (interval(own.value, own.half(), factor)) } } };
-    html! { (table("Estimated beside the noise, with halves of the 95 % intervals", &html! { th { "beyond the calibration" } @for axis in AXES { th.n { (axis) } } }, &html! {
+    html! { (by_axes("Estimated beside the noise, with halves of the 95 % intervals", &html! { "beyond the calibration" }, &html! {
         (row("gyro bias, deg/s", &result.biases.gyro, 1_f64.to_degrees()))
         (row("accel bias, mm/s²", &result.biases.accel, 1e3))
         @if let Some(mounted) = &result.mounted {

@@ -3,13 +3,13 @@
 use maud::{Markup, html};
 use mimu::judgement::JudgementKind;
 use mimu::parameter::ParameterKind;
-use mimu::quantity::{AXES, Sensor, plural, plus_minus};
+use mimu::quantity::{Sensor, plural, plus_minus};
 use mimu::readable;
 use mimu::result::sessions::{SensorSessions, SessionParameter, SessionsResult};
 
 use super::fit::by_axis;
 use super::page::{Level, judged};
-use super::table::{interval, known, rounded, table, typed, with_unit};
+use super::table::{by_axes, interval, known, rounded, table, typed, with_unit};
 use super::terminal::text;
 
 /// Result of `mimu fit` with several recordings: a summary, or with `verbose` also each session.
@@ -81,7 +81,7 @@ fn parameters(
     ends: impl Fn(&SessionParameter) -> Option<[f64; 2]>,
 ) -> Markup {
     let of_kind = |kind: ParameterKind| triad.parameters.iter().filter(move |p| p.of.0 == kind);
-    html! { (table("Parameters with 95 % intervals", &html! { th { (sensor) ", ± of 95 % " (of) } @for axis in AXES { th.n { (axis) } } }, &html! {
+    html! { (by_axes("Parameters with 95 % intervals", &html! { (sensor) ", ± of 95 % " (of) }, &html! {
         @for kind in ParameterKind::PHYSICAL { @if let Some(first) = of_kind(kind).find(|p| ends(p).is_some()) {
             @let unit = readable::parameter(&first.unit);
             tr { td { "  " (by_axis(kind, &unit)) } @for p in of_kind(kind) { @match ends(p).map(|[low, high]| 0.5 * (high - low)) {

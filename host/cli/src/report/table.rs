@@ -1,14 +1,28 @@
 //! Tables of results: cells whose numbers have the value of the JSON beside their digits. `factor` converts from SI to the unit of the column or row.
 
 use maud::{Markup, html};
-use mimu::quantity::{plus_minus, significant};
+use mimu::quantity::{AXES, plus_minus, significant};
 use mimu::readable::Readable;
 
 use super::page::written;
 
 /// A table. The caption is for pages. Cells of the class `n` are numbers, those of the class `page` only pages show.
 pub(super) fn table(caption: &str, heads: &Markup, rows: &Markup) -> Markup {
-    html! { div.scroll { table { caption { (caption) } thead { tr { (heads) } } tbody { (rows) } } } }
+    classed(None, caption, heads, rows)
+}
+
+/// A table by axis, which a terminal does not fold: it is never much wider than the text.
+pub(super) fn by_axes(caption: &str, first: &Markup, rows: &Markup) -> Markup {
+    classed(
+        Some("long"),
+        caption,
+        &html! { th { (first) } @for axis in AXES { th.n { (axis) } } },
+        rows,
+    )
+}
+
+fn classed(class: Option<&str>, caption: &str, heads: &Markup, rows: &Markup) -> Markup {
+    html! { div.scroll { table class=[class] { caption { (caption) } thead { tr { (heads) } } tbody { (rows) } } } }
 }
 
 /// A number whose digits are given.

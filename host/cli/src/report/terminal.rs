@@ -46,19 +46,19 @@ pub(crate) fn text(document: &Markup) -> String {
     lines.finish()
 }
 
-/// An element, or without a tag words.
+/// An element with its attributes as written, or without a tag words.
 #[derive(Debug, Default)]
 struct Element {
     tag: String,
-    attributes: Vec<(String, String)>,
+    attributes: String,
     inside: Vec<Element>,
     words: String,
 }
 
 impl Element {
-    fn attribute(&self, name: &str) -> Option<&str> {
-        let found = self.attributes.iter().find(|(key, _)| key == name);
-        found.map(|(_, value)| value.as_str())
+    fn attribute(&self, name: &str) -> Option<String> {
+        let (_, value) = self.attributes.split_once(&format!("{name}=\""))?;
+        value.split('"').next().map(plain)
     }
 
     fn is(&self, class: &str) -> bool {
@@ -105,53 +105,41 @@ fn typed(number: String) -> String {
 /// HTML that maud has written.
 fn parse(html: &str) -> Vec<Element> {
     let mut open = vec![Element::default()];
-    let last = |open: &[Element]| open.len() - 1;
     for piece in html.split('<') {
         let (tag, words) = piece.split_once('>').unwrap_or(("", piece));
         let (name, attributes) = tag.split_once(' ').unwrap_or((tag, ""));
+        let name = name.trim_end_matches('/');
         if !name.is_empty() && !name.starts_with('/') {
-            let mut parts = attributes.split('"');
-            let mut element = Element {
-                tag: name.trim_end_matches('/').into(),
-                ..Element::default()
-            };
-            while let (Some(key), Some(value)) = (parts.next(), parts.next()) {
-                element
-                    .attributes
-                    .push((key.trim().trim_end_matches('=').into(), plain(value)));
-            }
-            open.push(element);
-        }
-        let ends = name.starts_with('/') || name.starts_with("br") || name.starts_with("hr");
-        if ends && open.len() > 1 {
-            let whole = open.pop();
-            let inner = last(&open);
-            open[inner].inside.extend(whole);
-        }
-        if !words.is_empty() {
-            let inner = last(&open);
-            open[inner].inside.push(Element {
-                words: plain(words),
+            let (tag, attributes) = (name.into(), attributes.into());
+            open.push(Element {
+                tag,
+                attributes,
                 ..Element::default()
             });
         }
+        if name.starts_with('/') || ["br", "hr"].contains(&name) {
+            let whole = open.pop();
+            if let Some(outer) = open.last_mut() {
+                outer.inside.extend(whole);
+            }
+        }
+        if !words.is_empty() {
+            let words = Element {
+                words: plain(words),
+                ..Element::default()
+            };
+            if let Some(inner) = open.last_mut() {
+                inner.inside.push(words);
+            }
+        }
     }
-    open.swap_remove(0).inside
+    open.pop().unwrap_or_default().inside
 }
 
 /// Text without the escapes of HTML.
 fn plain(text: &str) -> String {
-    let escapes = [
-        ("&lt;", "<"),
-        ("&gt;", ">"),
-        ("&quot;", "\""),
-        ("&amp;", "&"),
-    ];
-    escapes
-        .iter()
-        .fold(text.to_owned(), |text, (escape, sign)| {
-            text.replace(escape, sign)
-        })
+    let text = text.replace("&lt;", "<").replace("&gt;", ">");
+    text.replace("&quot;", "\"").replace("&amp;", "&")
 }
 
 /// Lines of a text, and the warnings of a summary, which get the lines that the rest leaves them: their place, and the number of further lines that the
@@ -165,12 +153,14 @@ struct Lines {
 impl Lines {
     fn blocks(&mut self, elements: &[Element], pad: &str) {
         for e in elements {
-            let head = |own: &str| pad.to_owned() + e.attribute("data-head").unwrap_or(own);
-            let items = || {
-                e.all("li")
-                    .into_iter()
-                    .map(|item| head("  - ") + &item.words())
+            let head = |own: &str| {
+                format!(
+                    "{pad}{}",
+                    e.attribute("data-head").as_deref().unwrap_or(own)
+                )
             };
+            let items = e.all("li");
+            let items = items.iter().map(|item| (head("  - "), item.words()));
             match e.tag.as_str() {
                 "" | "h1" | "nav" | "figure" | "svg" | "style" | "img" => {}
                 "h2" | "hr" => self.space(),
@@ -180,21 +170,22 @@ impl Lines {
                 }
                 "p" if e.is("line") => self.done.push(head("") + &e.words()),
                 "p" => self.wrap(&head(""), &e.words()),
-                "pre" => self.done.extend(
-                    e.words()
-                        .lines()
-                        .map(|line| format!("{pad}{}", line.trim_end())),
-                ),
+                "pre" => {
+                    let lines = e.words();
+                    self.done.extend(
+                        lines
+                            .lines()
+                            .map(|line| format!("{pad}{}", line.trim_end())),
+                    );
+                }
                 "dl" => self.terms(e, pad),
                 "ul" if e.is("fitted") => {
                     let after = e.attribute("data-after").and_then(|n| n.parse().ok());
-                    self.warnings = Some((self.done.len(), items().collect(), after.unwrap_or(0)));
+                    let items = items.map(|(head, words)| head + &words).collect();
+                    self.warnings = Some((self.done.len(), items, after.unwrap_or(0)));
                 }
-                "ul" if e.is("lines") => self.done.extend(items()),
-                "ul" => e
-                    .all("li")
-                    .iter()
-                    .for_each(|item| self.wrap(&head("  - "), &item.words())),
+                "ul" if e.is("lines") => self.done.extend(items.map(|(head, words)| head + &words)),
+                "ul" => items.for_each(|(head, words)| self.wrap(&head, &words)),
                 "table" => self.table(e, pad),
                 "section" => self.blocks(&e.inside, &format!("{pad}  ")),
                 _ => self.blocks(&e.inside, pad),

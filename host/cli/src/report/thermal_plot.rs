@@ -52,7 +52,8 @@ fn rows(result: &ThermalResult) -> Vec<Vec<Drawn>> {
                     errors(result, sensor, found),
                 ));
             }
-            row.extend(dwells(result, sensor, found, label));
+            let labels = ["over temperature", "over time"].map(label);
+            row.extend(labels.into_iter().zip(dwells(result, sensor, found)));
         }
         rows.push(row);
     }
@@ -62,10 +63,8 @@ fn rows(result: &ThermalResult) -> Vec<Vec<Drawn>> {
 /// All panels as one file.
 pub fn svg(result: &ThermalResult) -> String {
     let rows = rows(result);
-    let (width, height) = (
-        PANEL.0 * ParameterKind::PHYSICAL.len() as f64,
-        PANEL.1 * rows.len() as f64,
-    );
+    let [across, down] = [ParameterKind::PHYSICAL.len(), rows.len()].map(|n| n as f64);
+    let (width, height) = (PANEL.0 * across, PANEL.1 * down);
     let drawn = html! {
         svg class="curves" xmlns="http://www.w3.org/2000/svg" width=(width) height=(height) viewBox={ "0 0 " (width) " " (height) } {
             style { (STYLE) }
@@ -88,68 +87,71 @@ pub(super) fn panel(label: &str, drawn: &Markup) -> Markup {
     html! { svg class="curves" role="img" aria-label=(label) viewBox={ "0 0 " (PANEL.0) " " (PANEL.1) } xmlns="http://www.w3.org/2000/svg" { (drawn) } }
 }
 
-/// Axes with their names and a legend, around what is `inside`.
-fn framed(
-    heading: &str,
-    [x_name, y_name]: [&str; 2],
-    x: Range<f64>,
-    y: Range<f64>,
-    key: &[(&str, &str)],
-    inside: impl Fn(&Frame) -> Markup,
-) -> Markup {
-    let frame = Frame {
+/// The frame of a panel with these ranges.
+fn frame([from, to]: [f64; 2], y: Range<f64>) -> Frame {
+    Frame {
         across: 78.0..PANEL.0 - 12.0,
         down: 34.0..PANEL.1 - 46.0,
-        x,
+        x: from..to,
         y,
-    };
-    html! { (frame.axes(heading, true)) (inside(&frame)) (frame.x_name(x_name, &frame)) (frame.y_name(y_name)) (frame.legend(key)) }
+    }
 }
 
-/// A point of a curve: the change from the middle of the range.
-pub(super) struct Point {
-    /// Temperature, °C.
-    pub temp_c: f64,
-    /// Change.
-    pub value: f64,
-    /// Bounds of its 95 % interval, if known.
-    pub interval: Option<[f64; 2]>,
+/// Axes with their names and a legend, around what is `inside`.
+fn framed(
+    frame: &Frame,
+    [heading, x, y]: [&str; 3],
+    key: &[(&str, &str)],
+    inside: &Markup,
+) -> Markup {
+    html! { (frame.axes(heading, true)) (inside) (frame.x_name(x, frame)) (frame.y_name(y)) (frame.legend(key)) }
 }
 
-/// Changes of one kind of parameter over the range of temperatures: its heading, its unit, and name and curve of each axis, with their bands.
+/// A point of a curve: temperature, °C, change from the middle of the range, and bounds of its 95 % interval, if known.
+pub(super) type Point = (f64, f64, Option<[f64; 2]>);
+
+/// Changes of one kind of parameter in a range of temperatures, with name and curve of each axis.
 pub(super) fn changes(
     heading: &str,
     unit: &str,
-    [from, to]: [f64; 2],
+    range_c: [f64; 2],
     curves: &[(String, Vec<Point>)],
 ) -> Markup {
-    let ends = |p: &Point| p.interval.unwrap_or([p.value; 2]);
-    let y = range(curves.iter().flat_map(|(_, points)| points).flat_map(ends));
+    let values = curves.iter().flat_map(|(_, points)| points);
+    let frame = frame(
+        range_c,
+        range(values.flat_map(|(_, value, ends)| ends.unwrap_or([*value; 2]))),
+    );
     let each = || CLASSES.into_iter().zip(curves);
     let key: Vec<(&str, &str)> = each()
         .map(|(class, (axis, _))| (class, axis.as_str()))
         .collect();
-    let names = ["die, °C", &format!("change from the middle, {unit}")];
-    framed(heading, names, from..to, y, &key, |frame| {
-        html! { @for (class, (_, points)) in each() {
-            @let band: Vec<_> = points.iter().filter_map(|p| p.interval.map(|[low, high]| (p.temp_c, low, high))).collect();
-            @if !band.is_empty() { (frame.band(&format!("{class} band"), &band)) }
-            (frame.line(class, points.iter().map(|p| (p.temp_c, p.value))))
-        } }
-    })
+    let inside = html! { @for (class, (_, points)) in each() {
+        @let band: Vec<_> = points.iter().filter_map(|(t, _, ends)| ends.map(|[low, high]| (*t, low, high))).collect();
+        @if !band.is_empty() { (frame.band(&format!("{class} band"), &band)) }
+        (frame.line(class, points.iter().map(|(t, value, _)| (*t, *value))))
+    } };
+    framed(
+        &frame,
+        [
+            heading,
+            "die, °C",
+            &format!("change from the middle, {unit}"),
+        ],
+        &key,
+        &inside,
+    )
 }
 
 /// Curves of one kind of parameter of a sensor, if it has them.
 fn curves(result: &ThermalResult, sensor: Sensor, kind: ParameterKind) -> Option<Markup> {
     // In recordings with one pose the accelerometer's bias includes gravity.
-    let ours = |of: ParameterKind| {
-        of == kind || (of == ParameterKind::BiasAndGravity && kind == ParameterKind::Bias)
-    };
-    let found = result
-        .curves
-        .iter()
-        .filter(|c| c.sensor == sensor && ours(c.of.0));
-    let found: Vec<&CurveResult> = found.collect();
+    let with_gravity = ParameterKind::BiasAndGravity;
+    let ours = |of: ParameterKind| of == kind || of == with_gravity && kind == ParameterKind::Bias;
+    let found = result.curves.iter();
+    let found: Vec<&CurveResult> = found
+        .filter(|c| c.sensor == sensor && ours(c.of.0))
+        .collect();
     let first = found.first()?;
     // Scale factors are shown as relative changes.
     let relative = kind == ParameterKind::Scale;
@@ -157,138 +159,94 @@ fn curves(result: &ThermalResult, sensor: Sensor, kind: ParameterKind) -> Option
     let curve = |curve: &&CurveResult| {
         let middle = curve.value[curve.value.len() / 2];
         let by = if relative { 1e6 / middle } else { unit.factor };
-        let points = (0..curve.temp_c.len()).map(|k| {
-            let [value, low, high] =
-                [curve.value[k], curve.lower[k], curve.upper[k]].map(|v| (v - middle) * by);
-            Point {
-                temp_c: curve.temp_c[k],
-                value,
-                interval: Some([low, high]),
-            }
-        });
+        let change = |values: &[f64], k: usize| (values[k] - middle) * by;
+        let ends = |k: usize| [change(&curve.lower, k), change(&curve.upper, k)];
+        let points = curve.temp_c.iter().enumerate();
+        let points = points.map(|(k, t)| (*t, change(&curve.value, k), Some(ends(k))));
         (curve.of.axis(), points.collect())
     };
     let all: Vec<_> = found.iter().map(curve).collect();
+    let heading = format!("{sensor} {}", first.of.0.words());
     let unit = if relative { "ppm" } else { &unit.unit };
-    Some(changes(
-        &format!("{sensor} {}", first.of.0.words()),
-        unit,
-        result.range_c,
-        &all,
-    ))
+    Some(changes(&heading, unit, result.range_c, &all))
 }
 
 /// Errors of dwells by temperature, separately for heating and cooling.
 fn errors(result: &ThermalResult, sensor: Sensor, found: &SensorResult) -> Markup {
     let unit = readable::error(&found.unit);
     let [from, to] = result.range_c;
+    // In the middle of the temperatures that the dies had in a bin.
+    let middle = |b: &Bin| 0.5 * (b.from_c.max(from) + b.to_c.min(to));
     let points = |of: fn(&Bin) -> Option<f64>| -> Vec<(f64, f64)> {
-        // In the middle of the temperatures that the dies had in a bin.
-        let point = |b: &Bin| {
-            Some((
-                0.5 * (b.from_c.max(from) + b.to_c.min(to)),
-                of(b)? * unit.factor,
-            ))
-        };
+        let point = |b: &Bin| Some((middle(b), of(b)? * unit.factor));
         found.bins.iter().filter_map(point).collect()
     };
+    let (heating, cooling) = (points(|b| b.heating), points(|b| b.cooling));
     let lines = [
-        ("heating", points(|b| b.heating)),
-        ("cooling", points(|b| b.cooling)),
+        ("heating", heating),
+        ("cooling", cooling),
         ("noise", points(|b| Some(b.noise_floor))),
     ];
-    let y = range(
-        lines
-            .iter()
-            .flat_map(|l| l.1.iter().map(|p| p.1))
-            .chain([0.0]),
-    );
-    let key = ["heating", "cooling", "noise"].map(|name| (name, name));
-    let names = [
-        "die, °C",
-        &format!("rms over {}, {}", found.judged_by, unit.unit),
-    ];
+    let all = lines.iter().flat_map(|l| l.1.iter().map(|p| p.1));
+    let frame = frame([from, to], range(all.chain([0.0])));
+    let inside =
+        html! { @for (class, points) in &lines { (frame.line(class, points.iter().copied())) } };
+    let y_name = format!("rms over {}, {}", found.judged_by, unit.unit);
+    let key = lines.each_ref().map(|(name, _)| (*name, *name));
     framed(
-        &format!("{sensor} error"),
-        names,
-        from..to,
-        y,
+        &frame,
+        [&format!("{sensor} error"), "die, °C", &y_name],
         &key,
-        |frame| {
-            html! { @for (class, points) in &lines { (frame.line(class, points.iter().copied())) } }
-        },
+        &inside,
     )
 }
 
-/// Mean of neighbouring dwells in the shown unit: hours since the beginning of the first recording, temperature of the die, errors.
-struct Mark {
-    hours: f64,
-    die_c: f64,
-    error: [f64; 3],
-}
+/// Mean of neighbouring dwells: hours since the beginning of the first recording, temperature of the die, and errors in the shown unit.
+type Mark = ([f64; 2], [f64; 3]);
 
 /// Errors of the dwells of each axis, over temperature and over time.
-fn dwells(
-    result: &ThermalResult,
-    sensor: Sensor,
-    found: &SensorResult,
-    label: impl Fn(&str) -> String,
-) -> [Drawn; 2] {
+fn dwells(result: &ThermalResult, sensor: Sensor, found: &SensorResult) -> [Markup; 2] {
     let unit = readable::error(&found.unit);
     let each = found.dwells.len().div_ceil(MARKS).max(1);
-    let (mut marks, mut begins, mut start) = (Vec::new(), Vec::new(), 0.0);
+    let (mut marks, mut begins, mut start): (Vec<Mark>, _, _) = (Vec::new(), Vec::new(), 0.0);
     for recording in found.dwells.chunk_by(|a, b| a.recording == b.recording) {
-        if recording[0].recording > 0 {
-            begins.push(start);
-        }
-        for dwells in recording.chunks(each) {
-            let mean = |of: &dyn Fn(&DwellError) -> f64| {
-                dwells.iter().map(of).sum::<f64>() / dwells.len() as f64
-            };
-            marks.push(Mark {
-                hours: start + mean(&|d| d.middle_s) / 3600.0,
-                die_c: mean(&|d| d.die_c),
-                error: [0, 1, 2].map(|k| unit.factor * mean(&|d| d.error[k])),
-            });
+        begins.extend((recording[0].recording > 0).then_some(start));
+        for few in recording.chunks(each) {
+            let sum = |of: &dyn Fn(&DwellError) -> f64| few.iter().map(of).sum::<f64>();
+            let mean = |of: &dyn Fn(&DwellError) -> f64| sum(of) / few.len() as f64;
+            let errors = [0, 1, 2].map(|k| unit.factor * mean(&|d| d.error[k]));
+            marks.push((
+                [start + mean(&|d| d.middle_s) / 3600.0, mean(&|d| d.die_c)],
+                errors,
+            ));
         }
         start += recording[recording.len() - 1].middle_s / 3600.0;
     }
-    let y_name = match each {
-        1 => format!("error, {}", unit.unit),
-        n => format!("error, means of {n}, {}", unit.unit),
+    let means = if each > 1 {
+        format!("means of {each}, ")
+    } else {
+        String::new()
     };
+    let y_name = format!("error, {means}{}", unit.unit);
     let key: Vec<(&str, &str)> = CLASSES.into_iter().zip(AXES).collect();
-    let y = range(marks.iter().flat_map(|m| m.error));
-    let drawn = |heading: String,
-                 x_name: &str,
-                 x: Range<f64>,
-                 begins: &[f64],
-                 at: fn(&Mark) -> f64| {
-        framed(&heading, [x_name, &y_name], x, y.clone(), &key, |frame| {
-            html! {
-                @for hours in begins { path class="begin" d={ "M" (px(frame.at_x(*hours))) " " (px(frame.down.start)) "V" (px(frame.down.end)) } {} }
-                @for (axis, class) in CLASSES.iter().enumerate() { (frame.dots(&format!("{class} dot"), marks.iter().map(|m| (at(m), m.error[axis])))) }
-            }
-        })
+    let y = range(marks.iter().flat_map(|m| m.1));
+    let drawn = |at: usize, x: [f64; 2], heading: String, x_name: &str| {
+        let frame = frame(x, y.clone());
+        let inside = html! {
+            @if at == 0 { @for hours in &begins { path class="begin" d={ "M" (px(frame.at_x(*hours))) " " (px(frame.down.start)) "V" (px(frame.down.end)) } {} } }
+            @for (axis, class) in CLASSES.iter().enumerate() { (frame.dots(&format!("{class} dot"), marks.iter().map(|m| (m.0[at], m.1[axis])))) }
+        };
+        framed(&frame, [&heading, x_name, &y_name], &key, &inside)
     };
-    let [from, to] = result.range_c;
-    let hours = range(marks.iter().map(|m| m.hours));
+    let hours = range(marks.iter().map(|m| m.0[0]));
+    let over_time = drawn(
+        0,
+        [hours.start, hours.end],
+        format!("{sensor} error over time"),
+        "time, h",
+    );
     [
-        (
-            label("over temperature"),
-            drawn(format!("{sensor} error"), "die, °C", from..to, &[], |m| {
-                m.die_c
-            }),
-        ),
-        (
-            label("over time"),
-            drawn(
-                format!("{sensor} error over time"),
-                "time, h",
-                hours,
-                &begins,
-                |m| m.hours,
-            ),
-        ),
+        drawn(1, result.range_c, format!("{sensor} error"), "die, °C"),
+        over_time,
     ]
 }

@@ -109,7 +109,6 @@ fn identity(unit: &UnitReport, made: &Made) -> Markup {
         dt { "Unit" } dd { (calibration.device) @if let Some(id) = &calibration.unit_id { ", number " code { (id) } } }
         dt { "Reported" } dd { (made.created) }
         @if let Some(created) = &calibration.created { dt { "Calibrated" } dd { (created) } }
-        @if let Some(judgement) = &calibration.judgement { dt { "Judgement" } dd { (judgement) } }
         @for source in unit.diagnosis.iter().flat_map(|d| &d.recordings) {
             dt { "Recording" } dd { code { (source.place) } ", SHA-256 " code { (source.sha256) } }
         }

@@ -21,10 +21,8 @@ pub fn verify_text(verification: &Verification, verbose: bool) -> String {
 pub(super) fn document(one: &[(String, Verification); 1], level: Level) -> Markup {
     let verification = &one[0].1;
     let decisive = |w: &&Warning| w.to_string() == verification.judgement.reason;
-    let others = verification
-        .warnings
-        .iter()
-        .filter(|w| level.has_all() || !decisive(w));
+    let all = verification.warnings.iter();
+    let others = all.filter(|w| level.has_all() || !decisive(w));
     let said = kinds(
         others,
         Warning::is_like,
@@ -67,10 +65,8 @@ pub(super) fn whole_turns(turned: &WholeTurnsOfAxis) -> Markup {
 
 /// What the gyro reads for whole turns, by recording and axis; `used`: whether the calibration was made from the recording.
 pub(super) fn whole_turns_table(all: &[(String, bool, Vec<WholeTurnsOfAxis>)]) -> Markup {
-    let as_came = all
-        .iter()
-        .flat_map(|(_, _, turned)| turned)
-        .any(|turned| turned.uncalibrated_deg_per_turn.is_some());
+    let mut each = all.iter().flat_map(|(_, _, turned)| turned);
+    let as_came = each.any(|turned| turned.uncalibrated_deg_per_turn.is_some());
     let caption = "Degrees that the gyro reads for one turn of 360 degrees, by whole turns after which the unit was put back; 95 % intervals by how well it was put back";
     html! { (table(caption, &html! {
         th { "axis" } th.n { @if as_came { "uncalibrated" } @else { "one scale factor for all axes" } } th.n { "calibrated" } th.n { "turns" } th.n { "put back" } th { "used by the fit" } th { "recording" }
@@ -82,16 +78,11 @@ pub(super) fn whole_turns_table(all: &[(String, bool, Vec<WholeTurnsOfAxis>)]) -
 
 /// Errors on recordings that the calibration was not made from, by recording and sensor.
 pub(super) fn errors(all: &[(String, Verification)]) -> Markup {
-    let has = |of: fn(&SensorVerification) -> Option<f64>| {
-        all.iter()
-            .flat_map(|(_, v)| v.sensors.present())
-            .any(|(_, s)| of(s).is_some())
-    };
-    let (came, effects, at_rest) = (
-        has(|s| s.rms_uncalibrated),
-        has(|s| s.rms_affine),
-        has(|s| s.static_rms),
-    );
+    let each = || all.iter().flat_map(|(_, v)| v.sensors.present());
+    let has = |of: fn(&SensorVerification) -> bool| each().any(|(_, s)| of(s));
+    let came = has(|s| s.rms_uncalibrated.is_some());
+    let effects = has(|s| s.rms_affine.is_some());
+    let at_rest = has(|s| s.static_rms.is_some());
     let rest = readable::error("rad/s");
     html! { (table("Error of the calibration on other recordings, rms; noise: what noise alone would cause", &html! {
         th { "rms error" } th.n { "calibrated" } th.n { "noise" } th.n { "largest" } th.n { "one for all" }

@@ -14,78 +14,38 @@ use crate::hint;
 
 /// An event as lines of text; none for events that only programs need.
 pub fn wizard_lines(event: &Event) -> Vec<String> {
-    let line = match event {
-        Event::Greeted { told, unit } if told.is_empty() => unit.clone(),
-        Event::Greeted { told, .. } => return told.clone(),
-        Event::Resumed { dwells } => format!(
-            "the session continues after {}",
-            plural(*dwells as u64, "dwell")
-        ),
-        Event::SelfTested {
-            words,
-            passed: true,
-            ..
-        } => format!("self-test: {words}"),
-        Event::SelfTested { words, .. } => format!("self-test FAILED: {words}"),
-        Event::Phase { phase, words } => return vec![String::new(), format!("{phase}: {words}")],
-        Event::Step {
-            done,
-            planned,
-            words,
-            ..
-        } => format!("[{}/{planned}] {words}", done + 1),
-        Event::Spin {
-            done,
-            planned,
-            words,
-            ..
-        } => format!("[whole turns {}/{planned}] {words}", done + 1),
-        Event::Turned { turns: 0, .. } => "    it has rested: turn it now".into(),
-        Event::Turned { axis, turns, .. } => {
-            format!("    {} about {axis}", plural(u64::from(*turns), "turn"))
+    text(&of_event(event)).lines().map(String::from).collect()
+}
+
+fn of_event(event: &Event) -> Markup {
+    html! { @match event {
+        Event::Greeted { told, unit } => { @if told.is_empty() { p.line { (unit) } } @for line in told { p.line { (line) } } }
+        Event::Resumed { dwells } => p.line { "the session continues after " (plural(*dwells as u64, "dwell")) },
+        Event::SelfTested { words, passed, .. } => p.line { @if *passed { "self-test: " } @else { "self-test FAILED: " } (words) },
+        Event::Phase { phase, words } => pre { "\n" (phase) ": " (words) },
+        Event::Step { done, planned, words, .. } => p.line { "[" (done + 1) "/" (planned) "] " (words) },
+        Event::Spin { done, planned, words, .. } => p.line { "[whole turns " (done + 1) "/" (planned) "] " (words) },
+        Event::Turned { turns: 0, .. } => p.line { "    it has rested: turn it now" },
+        Event::Turned { axis, turns, .. } => p.line { "    " (plural(u64::from(*turns), "turn")) " about " (axis) },
+        Event::Spun { axis, turns, .. } => p.line { "    done: " (plural(u64::from(*turns), "turn")) " about " (axis) ", and it lies where it lay" },
+        Event::SpinLost { why, .. } => p.line { "    these turns cannot be used: " (why) "; put it against the edge, let it rest, and turn it again" },
+        Event::Waiting { why, .. } => p.line { "    waiting: " (hint::of_waiting(why)) },
+        Event::Dwell { part: Part::Calibration, .. } => {}
+        Event::Dwell { number, .. } => p.line { "    dwell " (number) " done" },
+        Event::Discarded { why, .. } => p.line { "    discarded, repeat: " (hint::of_waiting(why)) },
+        Event::Redo { number } => p.line { "    dwell " (number) " will be repeated" },
+        Event::Progress { progress, .. } => p.line { "    " (progress_line(progress)) },
+        Event::Interrupted { why, .. } => p.line { "    " (why) },
+        Event::Verified { judged, .. } => (words(judged)),
+        Event::Stored { hash, words, .. } => p.line { (hash) ": " (words) },
+        Event::Diagnosed { verdict, effects, page, .. } => {
+            p.line { "verdict: " (verdict.name()) "; " @if effects.is_empty() { "no effect was found" } @else { "found: " (effects.join(", ")) } }
+            p.line { "page: " (page) }
         }
-        Event::Spun { axis, turns, .. } => format!(
-            "    done: {} about {axis}, and it lies where it lay",
-            plural(u64::from(*turns), "turn")
-        ),
-        Event::SpinLost { why, .. } => {
-            format!(
-                "    these turns cannot be used: {why}; put it against the edge, let it rest, and turn it again"
-            )
-        }
-        Event::Waiting { why, .. } => format!("    waiting: {}", hint::of_waiting(why)),
-        Event::Dwell {
-            part: Part::Calibration,
-            ..
-        } => return Vec::new(),
-        Event::Dwell { number, .. } => format!("    dwell {number} done"),
-        Event::Discarded { why, .. } => format!("    discarded, repeat: {}", hint::of_waiting(why)),
-        Event::Redo { number } => format!("    dwell {number} will be repeated"),
-        Event::Progress { progress, .. } => format!("    {}", progress_line(progress)),
-        Event::Interrupted { why, .. } => format!("    {why}"),
-        Event::Verified { judged, .. } => return judged_lines(judged),
-        Event::Stored { hash, words, .. } => format!("{hash}: {words}"),
-        Event::Diagnosed {
-            verdict,
-            effects,
-            page,
-            ..
-        } => {
-            let found = if effects.is_empty() {
-                "no effect was found".into()
-            } else {
-                format!("found: {}", effects.join(", "))
-            };
-            return vec![
-                format!("verdict: {}; {found}", verdict.name()),
-                format!("page: {page}"),
-            ];
-        }
-        Event::Note { words } => format!("    {words}"),
+        Event::Note { words } => p.line { "    " (words) },
         // The view asks the question and waits for the answer.
-        Event::Question { .. } => return Vec::new(),
-    };
-    vec![line]
+        Event::Question { .. } => {}
+    } }
 }
 
 /// The half-widths of a calibration with their targets, in one line.
@@ -96,24 +56,13 @@ pub(crate) fn progress_line(progress: &Progress) -> String {
     }
     let sensors = progress.sensors.iter().map(|sensor| {
         let aims = sensor.aims.iter().map(|aim| {
-            let mark = if aim.half_width <= aim.target {
-                ""
-            } else {
-                "!"
-            };
-            format!(
-                " {} ±{}{mark}",
-                aim.parameter.name(),
-                significant(aim.half_width)
-            )
+            let mark = if aim.half_width > aim.target { "!" } else { "" };
+            let (name, half) = (aim.parameter.name(), significant(aim.half_width));
+            format!(" {name} ±{half}{mark}")
         });
         format!(" {}{}", sensor.sensor, aims.collect::<String>())
     });
     format!("done;{}", sensors.collect::<Vec<_>>().join(";"))
-}
-
-fn judged_lines(judged: &Judged) -> Vec<String> {
-    text(&words(judged)).lines().map(String::from).collect()
 }
 
 fn words(judged: &Judged) -> Markup {

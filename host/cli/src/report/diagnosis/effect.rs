@@ -23,16 +23,8 @@ pub(super) fn section(
     level: Level,
 ) -> Markup {
     let alternatives = &a.chosen.alternatives;
-    let shown = if level.has_all() {
-        alternatives.len()
-    } else {
-        SHOWN
-    };
-    let words: Vec<String> = alternatives
-        .iter()
-        .take(shown)
-        .map(|other| format!("{} ({})", other.id, by(other.score_worse_by)))
-        .collect();
+    let most = if level.has_all() { usize::MAX } else { SHOWN };
+    let shown = alternatives.len().min(most);
     html! {
         @if level.is_page() { h3 { code { (a.effect.id()) } } }
         p { @if !level.is_page() { "+ " (a.effect.id()) ": " } (a.effect.candidate.about()) }
@@ -40,9 +32,10 @@ pub(super) fn section(
             p { "held out " (errors(s, a)) @if !a.of_unit { "; it is not stored in a calibration" } }
             @if level.has_all() { (coefficients(a)) } @else { (compact(a)) }
             @if let (Some((picture, panels)), true) = (drawn, level.is_page()) { (figure(a, picture, panels)) }
-            @if !words.is_empty() {
-                p { "or, by score: " (words.join(", ")) @if alternatives.len() > shown { ", one of " (alternatives.len() - shown) " more" } }
-            }
+            @if shown > 0 { p {
+                "or, by score: " @for (k, other) in alternatives[..shown].iter().enumerate() { @if k > 0 { ", " } (other.id) " (" (by(other.score_worse_by)) ")" }
+                @if alternatives.len() > shown { ", one of " (alternatives.len() - shown) " more" }
+            } }
             @for u in d.undecided.iter().filter(|u| u.id == a.effect.id()) { p { "or, undecided: " (u.law) " (" (by(u.difference)) ")" } }
         }
     }
@@ -96,7 +89,7 @@ fn compact(a: &Accepted) -> Markup {
     html! {
         @for of_unit in all.chunk_by(|a, b| a.unit == b.unit) {
             @let Readable { factor, unit } = readable::coefficient(&of_unit[0].unit);
-            @let each: Vec<String> = of_unit.iter().map(|c| format!("{} {}", c.name, plus_minus(c.value * factor, half(c) * factor))).collect();
+            @let each: Vec<String> = of_unit.iter().map(|c| format!("{}\u{a0}{}", c.name, plus_minus(c.value * factor, half(c) * factor))).collect();
             p { (each.join(", ")) " " (unit) }
         }
         @if let Some(form) = a.effect.nonlinear_parameter() { p { (form.name) " " (significant(form.value)) " (95 %: " (form.interval()) ")" } }

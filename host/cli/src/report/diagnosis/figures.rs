@@ -43,27 +43,22 @@ fn unit(kind: ResidualKind, sensor: Sensor) -> (f64, &'static str) {
 /// Frames side by side, for each of the ordinates, with `gap` between them.
 fn frames(x: &Range<f64>, y: &[Range<f64>], gap: f64) -> Vec<Frame> {
     let all = FIGURE.frame(x.clone(), y[0].clone());
-    let width = (all.across.end - all.across.start - gap * (y.len() - 1) as f64) / y.len() as f64;
-    let left = |k: usize| all.across.start + k as f64 * (width + gap);
-    let each = y.iter().enumerate();
-    each.map(|(k, y)| Frame {
-        across: left(k)..left(k) + width,
-        y: y.clone(),
-        ..all.clone()
-    })
-    .collect()
+    let width = (all.across.end - all.across.start + gap) / y.len() as f64;
+    let place = |(k, y): (usize, &Range<f64>)| {
+        let left = all.across.start + k as f64 * width;
+        Frame {
+            across: left..left + width - gap,
+            y: y.clone(),
+            ..all.clone()
+        }
+    };
+    y.iter().enumerate().map(place).collect()
 }
 
-/// A drawing of `rows` marks with the names of its axes.
-fn drawing(
-    label: &str,
-    rows: usize,
-    frames: &[Frame],
-    [x, y]: [&str; 2],
-    inside: &Markup,
-) -> Markup {
-    let all =
-        html! { (frames[0].y_name(y)) (frames[0].x_name(x, &frames[frames.len() - 1])) (inside) };
+/// A drawing of `rows` marks with its label and the names of its axes.
+fn drawing([label, x, y]: [&str; 3], rows: usize, frames: &[Frame], inside: &Markup) -> Markup {
+    let (first, last) = (&frames[0], &frames[frames.len() - 1]);
+    let all = html! { (first.y_name(y)) (first.x_name(x, last)) (inside) };
     FIGURE.drawing(label, (rows > MANY).then_some("many"), &all)
 }
 
@@ -75,27 +70,30 @@ struct Axis {
 }
 
 impl Axis {
-    /// An axis for values that are in its unit already.
-    fn new(what: &str, unit: &str, ends: &Range<f64>) -> Self {
-        let power = power_of_ten(ends);
+    /// An axis for values with an offset, of a quantity that is shown in a unit, to which the factor converts.
+    fn new(
+        what: &str,
+        (factor, unit): (f64, &str),
+        offset: f64,
+        values: impl Iterator<Item = f64>,
+    ) -> Self {
+        let ends = range(values.map(|v| v * factor + offset));
+        let power = power_of_ten(&ends);
         let by = 10f64.powi(-power);
+        let name = format!("{what}, {}{unit}", times_ten(power));
         Self {
             by,
-            name: format!("{what}, {}{unit}", times_ten(power)),
+            name,
             ends: ends.start * by..ends.end * by,
         }
     }
 
     /// The ordinate of residuals in SI, including zero.
     fn of_residuals(kind: ResidualKind, sensor: Sensor, values: impl Iterator<Item = f64>) -> Self {
-        let (factor, unit) = unit(kind, sensor);
-        let axis = Self::new(
-            "residual",
-            unit,
-            &range(values.map(|v| v * factor).chain([0.0])),
-        );
+        let unit = unit(kind, sensor);
+        let axis = Self::new("residual", unit, 0.0, values.chain([0.0]));
         Self {
-            by: factor * axis.by,
+            by: unit.0 * axis.by,
             ..axis
         }
     }
@@ -116,11 +114,8 @@ pub(super) fn in_time(sensor: Sensor, track: &Track, blocks_s: &[f64], after: bo
         Observable::Axis(_) | Observable::AtRest(_) => format!("{sensor} {}", track.name),
         _ => track.name.clone(),
     };
-    let frames = frames(
-        &range(samples.iter().map(|s| s.t_s / MINUTE_S)),
-        &vec![y.ends.clone(); shown],
-        GAP,
-    );
+    let minutes = range(samples.iter().map(|s| s.t_s / MINUTE_S));
+    let frames = frames(&minutes, &vec![y.ends.clone(); shown], GAP);
     let inside = html! { @for (k, frame) in frames.iter().enumerate() {
         (frame.stretches("block", &ends))
         (frame.axes(if k == 0 { &name } else { "after" }, k == 0))
@@ -128,23 +123,21 @@ pub(super) fn in_time(sensor: Sensor, track: &Track, blocks_s: &[f64], after: bo
         (frame.diamonds("held", samples.iter().map(|s| (s.t_s / MINUTE_S, s.held_out[k] * y.by))))
         (frame.dots("dot", samples.iter().map(|s| (s.t_s / MINUTE_S, s.residual[k] * y.by))))
     } };
-    drawing(
-        &format!("residual of {name} in time"),
-        samples.len(),
-        &frames,
-        ["time, min", &y.name],
-        &inside,
-    )
+    let names = [&format!("residual of {name} in time"), "time, min", &y.name];
+    drawing(names, samples.len(), &frames, &inside)
 }
 
 /// An effect against the quantity that it depends on, before and after its removal.
 pub(super) fn against(sensor: Sensor, panel: &Panel) -> Markup {
     let (points, curve) = (&panel.points, &panel.curve);
     let marks = points.iter().flat_map(|p| {
-        let bars = [p.partial + p.sigma, p.partial - p.sigma];
-        [p.partial, p.predicted, p.after, p.held_out]
-            .into_iter()
-            .chain(bars)
+        [
+            p.predicted,
+            p.after,
+            p.held_out,
+            p.partial - p.sigma,
+            p.partial + p.sigma,
+        ]
     });
     let values = marks.chain(
         curve
@@ -152,15 +145,12 @@ pub(super) fn against(sensor: Sensor, panel: &Panel) -> Markup {
             .flat_map(|c| [c.value - c.half, c.value + c.half]),
     );
     let y = Axis::of_residuals(panel.kind, sensor, values);
-    let (by, offset, what, of) = match &panel.against {
-        Against::Variable(a) => (a.factor, a.offset, a.name.as_str(), a.unit.as_str()),
-        Against::Fitted => {
-            let (factor, unit) = unit(panel.kind, sensor);
-            (factor, 0.0, "the effect by the fit", unit)
-        }
+    let (what, of, offset) = match &panel.against {
+        Against::Variable(a) => (a.name.as_str(), (a.factor, a.unit.as_str()), a.offset),
+        Against::Fitted => ("the effect by the fit", unit(panel.kind, sensor), 0.0),
     };
-    let axis = Axis::new(what, of, &range(points.iter().map(|p| p.x * by + offset)));
-    let x = |v: f64| (v * by + offset) * axis.by;
+    let axis = Axis::new(what, of, offset, points.iter().map(|p| p.x));
+    let x = |v: f64| (v * of.0 + offset) * axis.by;
     let frames = frames(&axis.ends, &[y.ends.clone(), y.ends.clone()], GAP);
     let (left, right) = (&frames[0], &frames[1]);
     // Residuals with their bars, and predicted ones.
@@ -182,11 +172,11 @@ pub(super) fn against(sensor: Sensor, panel: &Panel) -> Markup {
         (right.axes("effect taken out", false))
         (residuals(right, |p| [p.after, p.held_out]))
     };
+    let label = format!("{} against {}", panel.title, axis.name);
     drawing(
-        &format!("{} against {}", panel.title, axis.name),
+        [&label, &axis.name, &y.name],
         points.len(),
         &frames,
-        [&axis.name, &y.name],
         &inside,
     )
 }
@@ -197,7 +187,7 @@ pub(super) fn quantiles(picture: &Picture, after: bool) -> Markup {
     // Before an effect is removed, a row may be hundreds of sigmas off. Afterwards the line of noise has to be visible.
     let y = |k: usize| range(all.iter().flat_map(|q| [q.found[k], q.band[0], q.band[1]]));
     let ordinates: Vec<Range<f64>> = (0..if after { 2 } else { 1 }).map(y).collect();
-    let band: Vec<(f64, f64, f64)> = all
+    let band: Vec<_> = all
         .iter()
         .map(|q| (q.normal, q.band[0], q.band[1]))
         .collect();
@@ -208,11 +198,10 @@ pub(super) fn quantiles(picture: &Picture, after: bool) -> Markup {
         (frame.line("fit", all.iter().map(|q| (q.normal, q.normal))))
         (frame.dots("dot small", all.iter().map(|q| (q.normal, q.found[k]))))
     } };
-    drawing(
+    let names = [
         "residuals against the normal distribution",
-        all.len(),
-        &frames,
-        ["normal quantile, σ", "residual, σ"],
-        &inside,
-    )
+        "normal quantile, σ",
+        "residual, σ",
+    ];
+    drawing(names, all.len(), &frames, &inside)
 }

@@ -22,52 +22,39 @@ const CHART: Panel = Panel {
 /// Histogram of a parameter over the units, minus its mean, with the normal distribution of units and fit.
 pub(super) fn histogram(sensor: Sensor, of: &ParameterOfFleet) -> Markup {
     let readable = readable(of.unit);
-    let (by, bins) = (readable.factor, &of.histogram);
-    let total: usize = bins.counts.iter().sum();
-    let most = bins.counts.iter().max().map_or(1, |most| (*most).max(1));
-    let (low, width) = ((bins.from - of.mean) * by, bins.width * by);
-    let frame = SMALL.frame(
-        low..low + width * bins.counts.len() as f64,
-        0.0..1.08 * most as f64,
-    );
+    let (by, counts) = (readable.factor, &of.histogram.counts);
+    let total = counts.iter().sum::<usize>() as f64;
+    let most = counts.iter().max().map_or(1, |most| (*most).max(1));
+    let (low, width) = ((of.histogram.from - of.mean) * by, of.histogram.width * by);
+    let (from, to) = (low, low + width * counts.len() as f64);
+    let frame = SMALL.frame(from..to, 0.0..1.08 * most as f64);
     let name = parameter(sensor, &of.name);
     let sigma = of
         .sigma
         .hypot(of.fit_sigma)
         .hypot(of.within_sigma.unwrap_or(0.0))
         * by;
-    let bell = |x: f64| {
-        total as f64 * width * (-0.5 * (x / sigma).powi(2)).exp()
-            / (sigma * std::f64::consts::TAU.sqrt())
+    let highest = total * width / (sigma * std::f64::consts::TAU.sqrt());
+    let bell = |x: f64| (highest * (-0.5 * (x / sigma).powi(2)).exp()).min(frame.y.end);
+    let steps = (0..=100).map(|k| from + (to - from) * f64::from(k) / 100.0);
+    let bar = |(k, count): (usize, &usize)| {
+        let [left, right] = [k, k + 1].map(|k| frame.at_x(low + width * k as f64));
+        let (top, bottom) = (frame.at_y(*count as f64), frame.down.end);
+        format!(
+            "M{:.1} {bottom:.1}V{top:.1}H{:.1}V{bottom:.1}z",
+            left + 0.4,
+            right - 0.4
+        )
     };
-    let steps =
-        (0..=100).map(|k| frame.x.start + (frame.x.end - frame.x.start) * f64::from(k) / 100.0);
-    let bars = bins
-        .counts
-        .iter()
-        .enumerate()
-        .filter(|(_, count)| **count > 0)
-        .map(|(k, count)| {
-            let [left, right] = [k, k + 1].map(|k| frame.at_x(low + width * k as f64));
-            format!(
-                "M{:.1} {bottom:.1}V{:.1}H{:.1}V{bottom:.1}z",
-                left + 0.4,
-                frame.at_y(*count as f64),
-                right - 0.4,
-                bottom = frame.down.end
-            )
-        });
+    let filled = counts.iter().enumerate().filter(|(_, count)| **count > 0);
     let inside = html! {
         (frame.axes(&name, true))
-        path class="bars" d=(bars.collect::<String>()) {}
-        (frame.line("fit", steps.map(|x| (x, bell(x).min(frame.y.end)))))
+        path class="bars" d=(filled.map(bar).collect::<String>()) {}
+        (frame.line("fit", steps.map(|x| (x, bell(x)))))
         (frame.x_name(&format!("from the mean, {}", readable.unit), &frame))
     };
-    SMALL.drawing(
-        &format!("Histogram of {name} over the units"),
-        Some("many"),
-        &inside,
-    )
+    let label = format!("Histogram of {name} over the units");
+    SMALL.drawing(&label, Some("many"), &inside)
 }
 
 /// A control chart: means of days, their moving average, and its limits.
@@ -77,31 +64,33 @@ pub(super) fn chart(of: &ChartOfParameter, heading: &str) -> Markup {
     let Some((first, last)) = days.first().zip(days.last()) else {
         return html! {};
     };
-    let number = |day: &Date| {
-        day.since(*first)
-            .map_or(0.0, |span| f64::from(span.get_days()))
-    };
+    let number = |day: &Date| day.since(*first).map_or(0.0, |span| span.get_days().into());
     let at: Vec<f64> = days.iter().map(number).collect();
-    let [means, averages, limits] = [&of.means, &of.averages, &of.limits]
-        .map(|v| v.iter().map(|x| x * readable.factor).collect::<Vec<f64>>());
+    let scaled =
+        |values: &[f64]| -> Vec<f64> { values.iter().map(|x| x * readable.factor).collect() };
+    let [means, averages, limits] = [&of.means, &of.averages, &of.limits].map(|v| scaled(v));
     // Single days scatter more than their average; most are inside of three times the limits.
-    let widest = limits
+    let largest = limits
         .iter()
         .chain(&averages)
-        .fold(0.0, |most: f64, v| most.max(v.abs()));
+        .map(|v| v.abs())
+        .fold(0.0, f64::max);
     let means = means
         .iter()
-        .map(|mean| mean.clamp(-2.5 * widest, 2.5 * widest));
+        .map(|mean| mean.clamp(-2.5 * largest, 2.5 * largest));
     let ends = means
         .clone()
         .chain(limits.iter().flat_map(|l| [-l, *l]))
-        .chain(averages.iter().copied());
+        .chain(averages.clone());
     let frame = CHART.frame(at[0]..at[at.len() - 1].max(1.0), range(ends));
     // About five dates.
-    let step = (number(last).max(1.0) as i64 / 4).max(1);
-    let dates = (0..=number(last).max(1.0) as i64 / step)
-        .filter_map(|k| first.checked_add(jiff::Span::new().days(k * step)).ok());
-    let dates: Vec<(f64, String)> = dates.map(|day| (number(&day), day.to_string())).collect();
+    let length = number(last).max(1.0) as i64;
+    let step = (length / 4).max(1);
+    let date = |k: i64| first.checked_add(jiff::Span::new().days(k * step)).ok();
+    let dates = (0..=length / step)
+        .filter_map(date)
+        .map(|day| (number(&day), day.to_string()));
+    let dates: Vec<(f64, String)> = dates.collect();
     let since = of.since.iter().filter_map(|s| s.parse::<Date>().ok());
     let spans: Vec<(f64, f64)> = since.map(|day| (number(&day), frame.x.end)).collect();
     let inside = html! {
@@ -112,9 +101,6 @@ pub(super) fn chart(of: &ChartOfParameter, heading: &str) -> Markup {
         @for sign in [1.0, -1.0] { (frame.line("limit", at.iter().copied().zip(limits.iter().map(|l| sign * l)))) }
         (frame.line("fit", at.iter().copied().zip(averages.iter().copied())))
     };
-    CHART.drawing(
-        &format!("Control chart of {heading}"),
-        Some("many"),
-        &inside,
-    )
+    let label = format!("Control chart of {heading}");
+    CHART.drawing(&label, Some("many"), &inside)
 }

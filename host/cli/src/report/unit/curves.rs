@@ -8,7 +8,7 @@ use mimu::readable;
 use mimu::triad::Forward;
 
 use crate::report::page::{shown, spoken};
-use crate::report::thermal_plot::{Point, changes, panel};
+use crate::report::thermal_plot::{changes, panel};
 
 const POINTS: usize = 81;
 /// Half-width of a 95 % interval in standard deviations. Curves are estimated from so many rows that their errors are Gaussian.
@@ -76,26 +76,15 @@ fn drawn(over: &OverTemperature, curves: &Curves, sensor: Sensor, kind: Paramete
         let points = models.iter().enumerate().map(|(k, model)| {
             let (temp_c, value) = (temperature(k), (of(model) - of(middle)) * factor);
             let half = sigma(over, sensor, scale, axis, temp_c).map(|s| NORMAL_95 * s * factor);
-            Point {
-                temp_c,
-                value,
-                interval: half.map(|half| [value - half, value + half]),
-            }
+            (temp_c, value, half.map(|half| [value - half, value + half]))
         });
         (AXES[axis].to_string(), points.collect())
     };
     let name = if scale { "ppm" } else { &unit.unit };
     let curves: Vec<_> = (0..3).map(curve).collect();
-    let drawn = changes(
-        &format!("{sensor} {}", kind.words()),
-        name,
-        over.range_c,
-        &curves,
-    );
-    panel(
-        &format!("{sensor}: {} over temperature", kind.words()),
-        &drawn,
-    )
+    let what = kind.words();
+    let drawn = changes(&format!("{sensor} {what}"), name, over.range_c, &curves);
+    panel(&format!("{sensor}: {what} over temperature"), &drawn)
 }
 
 /// Standard deviation, raw, interpolated linearly between the nodes next to `temp_c`.
@@ -108,24 +97,13 @@ fn sigma(
 ) -> Option<f64> {
     let of = |node: &TemperatureNode| {
         let table = node.table(sensor)?;
-        let sigma = if scale {
-            table.sigma_scale_factor?
-        } else {
-            table.sigma_bias?
-        };
-        Some((node.temp_c, sigma[axis]))
+        let sigmas = [table.sigma_bias, table.sigma_scale_factor][usize::from(scale)]?;
+        Some((node.temp_c, sigmas[axis]))
     };
     let after = over.nodes.partition_point(|node| node.temp_c < temp_c);
     let last = over.nodes.len().checked_sub(1)?;
-    let (cold, warm) = (
-        of(&over.nodes[after.saturating_sub(1)])?,
-        of(&over.nodes[after.min(last)])?,
-    );
-    let span = warm.0 - cold.0;
-    let share = if span > 0.0 {
-        (temp_c - cold.0) / span
-    } else {
-        0.0
-    };
-    Some(cold.1 + share.clamp(0.0, 1.0) * (warm.1 - cold.1))
+    let (cold_c, cold) = of(&over.nodes[after.saturating_sub(1)])?;
+    let (warm_c, warm) = of(&over.nodes[after.min(last)])?;
+    let share = (temp_c - cold_c) / (warm_c - cold_c).max(f64::MIN_POSITIVE);
+    Some(cold + share.clamp(0.0, 1.0) * (warm - cold))
 }

@@ -9,7 +9,7 @@ use mimu_recording::RawUnit;
 
 use crate::report::fit::by_axis;
 use crate::report::page::spoken;
-use crate::report::table::{interval, number, table, typed};
+use crate::report::table::{by_axes, interval, number, table, typed};
 
 /// Tables of both sensors.
 pub fn section(calibration: &Calibration) -> Markup {
@@ -54,7 +54,7 @@ fn physical(triad: &TriadTable) -> Markup {
         factor: 1.0,
         unit: "deg".into(),
     };
-    html! { (table(&caption, &html! { th { "parameter" } @for axis in AXES { th.n { (axis) } } }, &html! {
+    html! { (by_axes(&caption, &html! { "parameter" }, &html! {
         (row(ParameterKind::Scale, p.scale_factor, p.sigma_scale_factor, gain.clone()))
         (row(ParameterKind::Bias, p.bias, p.sigma_bias, readable::parameter(&raw)))
         (row(ParameterKind::Misalignment, p.misalignment_deg, p.sigma_misalignment_deg, degrees()))

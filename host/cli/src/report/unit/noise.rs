@@ -78,11 +78,8 @@ fn drawn(sensor: Sensor, channels: &[&NoiseChannel], noise: &NoiseFile) -> Marku
         values().fold(0.0, f64::max) * 1.4,
     );
     let frame = Panel::ONE.frame(from.log10()..to.log10(), low.log10()..high.log10());
-    let entries: Vec<(&str, &str)> = CLASSES
-        .into_iter()
-        .cycle()
-        .zip(channels.iter().map(|c| c.name.as_str()))
-        .collect();
+    let names = channels.iter().map(|c| c.name.as_str());
+    let entries: Vec<(&str, &str)> = CLASSES.into_iter().cycle().zip(names).collect();
     let inside = html! {
         (frame.grid(spoken(sensor), &decades(&(from..to)), &decades(&(low..high)), true))
         (frame.y_name(&format!("Allan deviation, {}", unit.unit)))

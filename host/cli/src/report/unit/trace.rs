@@ -49,14 +49,11 @@ fn drawn(prepared: &Prepared, sensor: Sensor) -> Markup {
         range(blocks.iter().map(|b| b.start_s / MINUTE_S)),
         range(curves.iter().flatten().map(|p| p.1)),
     );
-    let used = prepared
-        .dwells
-        .list
-        .iter()
-        .filter(|d| d.faults[sensor].is_none());
-    let dwells: Vec<(f64, f64)> = used
-        .map(|d| (d.start_s / MINUTE_S, (d.start_s + d.duration_s) / MINUTE_S))
-        .collect();
+    let all = prepared.dwells.list.iter();
+    let used = all.filter(|d| d.faults[sensor].is_none());
+    let minutes = |s: f64| s / MINUTE_S;
+    let ends = used.map(|d| (minutes(d.start_s), minutes(d.start_s + d.duration_s)));
+    let dwells: Vec<(f64, f64)> = ends.collect();
     let unit = match prepared.manifest.raw_unit.to_string() {
         unit if unit == "SI" => sensor.unit().into(),
         unit => unit,
