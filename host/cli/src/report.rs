@@ -1,5 +1,7 @@
 //! Presentation of results: text, pages and plots.
 //!
+//! A result has one document, which is the HTML of its page at a level of detail. The terminal's text is made from it, and a notebook shows it.
+//!
 //! JSON is the result itself, in SI ([`mimu::result`]). A view receives only the result, so that it cannot show anything that JSON lacks. Units and
 //! digits are those of [`mimu::readable`] and [`mimu::quantity`].
 
@@ -11,7 +13,6 @@ mod apply;
 pub(crate) mod budget;
 mod certificate;
 mod compare;
-mod comparison;
 pub(crate) mod data_sheet;
 mod design;
 mod device;
@@ -26,14 +27,12 @@ mod refusal;
 mod sessions;
 mod svg;
 mod table;
-pub(crate) mod text;
+mod terminal;
 mod thermal;
-mod thermal_page;
 mod thermal_plan;
 pub(crate) mod thermal_plot;
 #[cfg(not(target_family = "wasm"))]
 mod thermal_record;
-mod trim;
 mod unit;
 mod verify;
 mod wizard;
@@ -44,10 +43,10 @@ pub use allan::allan_text;
 pub use apply::apply_text;
 pub use certificate::certificate_page;
 pub use compare::compare_text;
-pub use comparison::{check_text, kalman_text};
 pub use design::{comparison_text, design_text, next_text};
 pub use device::{
-    counters_text, download_text, info_text, record_text, self_test_text, stream_text, upload_text,
+    check_text, counters_text, download_text, info_text, kalman_text, record_text, self_test_text,
+    stream_text, trim_text, upload_text,
 };
 pub use diagnosis::{Detail, diagnosis_page, diagnosis_text, not_in_plan_text};
 pub use fit::{dwell_table, fit_text};
@@ -55,14 +54,13 @@ pub use fleet::{fleet_page, fleet_text};
 pub use import::import_text;
 pub use noise_in_use::noise_in_use_text;
 pub use page::Made;
+pub(crate) use page::problems_text;
 pub(crate) use refusal::{print_refusal, refused};
 pub use sessions::sessions_text;
-pub use thermal::{thermal_comparison_text, thermal_text};
-pub use thermal_page::thermal_page;
+pub use thermal::{thermal_comparison_text, thermal_page, thermal_text};
 pub use thermal_plan::thermal_plan_text;
 #[cfg(not(target_family = "wasm"))]
 pub(crate) use thermal_record::{thermal_progress, thermal_record_text};
-pub use trim::trim_text;
 pub use unit::{UnitReport, trace_figure, unit_page};
 pub use verify::verify_text;
 pub use wizard::{wizard_lines, wizard_text};

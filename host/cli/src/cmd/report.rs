@@ -20,8 +20,7 @@ use crate::hint::OF_A_LOG;
 use crate::output::{now, progress, show};
 use crate::reading::{LogArgs, read};
 use crate::report::refused;
-use crate::report::text::problems;
-use crate::report::{Made, UnitReport, unit_page};
+use crate::report::{Made, UnitReport, problems_text, unit_page};
 
 use self::certificate::{CertificateArgs, Given};
 
@@ -201,14 +200,13 @@ fn whole_turns(
 fn verdict(unit: &UnitReport) -> String {
     match unit.diagnosis {
         Some(d) => {
-            let mut out = String::new();
-            problems(&mut out, &d.recording_problems, d.has_several(), false);
-            out + &format!(
-                "{}: {}\njudgement: {}\n",
-                d.device,
-                d.verdict.name(),
-                d.judgement
-            )
+            problems_text(&d.recording_problems, d.has_several(), false)
+                + &format!(
+                    "{}: {}\njudgement: {}\n",
+                    d.device,
+                    d.verdict.name(),
+                    d.judgement
+                )
         }
         None => match &unit.calibration.judgement {
             Some(judgement) => format!("{}\njudgement: {judgement}\n", unit.calibration.device),

@@ -1,12 +1,11 @@
-//! Result of `mimu accept` as text.
+//! Result of `mimu accept`.
 
-use std::fmt::Write as _;
-
+use maud::{Markup, html};
 use mimu::quantity::{plural, plus_minus, significant};
 use mimu_station::document::{Document, Measurement, Problem, Verdict};
 
-use super::table::{Cell, Table};
-use super::text::wrap;
+use super::table::{number, table};
+use super::terminal::text;
 
 /// Standard uncertainties of the interval beside a value.
 const SIGMAS: f64 = 2.0;
@@ -17,63 +16,47 @@ const NAMED: usize = 3;
 
 /// The result of one of several units, in one line.
 pub fn accept_line(document: &Document) -> String {
-    let head = format!("{:<16} {:<13}", document.unit, document.verdict.name());
     let said = match (document.verdict, &document.problem) {
         (Verdict::NotMeasured, Some(problem)) => problem_words(problem),
         (Verdict::Failed, _) => failures(document),
         _ => summary(document),
     };
-    format!("{head} {said}\n")
+    format!(
+        "{:<16} {:<13} {said}\n",
+        document.unit,
+        document.verdict.name()
+    )
 }
 
 /// The result of one unit; with `all` also what has no limits, and where the limits are from.
 pub fn accept_text(document: &Document, all: bool) -> String {
-    let mut out = String::new();
-    let _ = writeln!(
-        out,
-        "verdict: {} ({})",
-        document.verdict.name(),
-        document.unit
-    );
-    if let Some(problem) = &document.problem {
-        let _ = writeln!(out, "  {}", problem_words(problem));
-        return out;
-    }
-    let _ = writeln!(out, "  {}", summary(document));
-    if document.verdict == Verdict::Failed {
-        wrap(&mut out, "  beyond its limits: ", &failures(document));
-    }
-    wrap(&mut out, "  ", &document.decision.words());
-    out.push('\n');
-    let shown = |m: &&Measurement| all || m.passed.is_some() && !is_plain_count(m);
+    // A count that passes, such as of stuck bits, is not in a summary.
+    let plain = |m: &Measurement| m.measured.sigma == 0.0 && m.passed == Some(true);
+    let shown = |m: &&Measurement| all || m.passed.is_some() && !plain(m);
     let rows: Vec<&Measurement> = document.measurements.iter().filter(shown).collect();
-    out += &table(&rows).text("  ");
-    let hidden = document.measurements.len() - rows.len();
-    if hidden > 0 {
-        let hidden = plural(hidden as u64, "value");
-        let _ = writeln!(
-            out,
-            "  and {hidden} without limits, or counts within them (--verbose)"
-        );
-    }
-    if all {
-        sources(&mut out, &document.measurements);
-    }
-    if let Some(found) = &document.as_found {
-        let verdict = found.verdict.name();
-        let _ = writeln!(out, "\nas found, by {}: {verdict}", found.calibration);
-        // A count is the same by every calibration.
-        let other = |m: &&Measurement| {
-            let same = |own: &Measurement| own.measured == m.measured && own.passed == m.passed;
-            m.passed.is_some() && !document.measurements.iter().any(same)
-        };
-        let rows: Vec<&Measurement> = found.measurements.iter().filter(other).collect();
-        out += &table(&rows).text("  ");
-    }
-    for missing in &document.not_measured {
-        wrap(&mut out, "  not measured: ", missing);
-    }
-    out
+    let hidden = (document.measurements.len() - rows.len()) as u64;
+    text(&html! {
+        p { "verdict: " (document.verdict.name()) " (" (document.unit) ")" }
+        section {
+            @if let Some(problem) = &document.problem { ul class="lines" data-head="" { li { (problem_words(problem)) } } } @else {
+                p { (summary(document)) }
+                @if document.verdict == Verdict::Failed { p data-head="beyond its limits: " { (failures(document)) } }
+                p { (document.decision.words()) }
+                hr;
+                (against_limits(&rows))
+                @if hidden > 0 { p { "and " (plural(hidden, "value")) " without limits, or counts within them (--verbose)" } }
+                @if all { (sources(&document.measurements)) }
+            }
+        }
+        @if let Some(found) = document.as_found.as_ref().filter(|_| document.problem.is_none()) {
+            // A count is the same by every calibration.
+            @let same = |m: &Measurement| document.measurements.iter().any(|own| own.measured == m.measured && own.passed == m.passed);
+            hr;
+            p { "as found, by " (found.calibration) ": " (found.verdict.name()) }
+            section { (against_limits(&found.measurements.iter().filter(|m| m.passed.is_some() && !same(m)).collect::<Vec<_>>())) }
+        }
+        @if document.problem.is_none() { section { @for missing in &document.not_measured { p data-head="not measured: " { (missing) } } } }
+    })
 }
 
 fn problem_words(problem: &Problem) -> String {
@@ -82,120 +65,77 @@ fn problem_words(problem: &Problem) -> String {
 
 /// What a good unit's line says.
 fn summary(document: &Document) -> String {
-    let limited = document.measurements.iter().filter(|m| m.passed.is_some());
-    let mut out = format!("{} kept", plural(limited.count() as u64, "limit"));
-    if document.verdict == Verdict::Failed {
-        out = String::new();
-    }
-    let mut say = |words: String| {
-        if !out.is_empty() {
-            out += ", ";
-        }
-        out += &words;
-    };
-    let gravity = document
-        .measurements
-        .iter()
-        .find(|m| m.measured.name == "gravity_error");
-    if let Some(m) = gravity {
-        let [value, sigma] = [m.measured.value, m.measured.sigma];
-        say(format!("gravity {} mg", plus_minus(value, SIGMAS * sigma)));
-    }
-    if let Some(up) = &document.up {
-        say(format!("{up} up"));
-    }
-    if let Some(s) = document.duration_s {
-        say(format!("{s:.1} s"));
-    }
-    if let Some(scale) = &document.scale {
-        say(scale.clone());
-    }
-    out
+    let all = &document.measurements;
+    let kept = all.iter().filter(|m| m.passed.is_some()).count() as u64;
+    let gravity = all.iter().find(|m| m.measured.name == "gravity_error");
+    let gravity = gravity.map(|m| {
+        format!(
+            "gravity {} mg",
+            plus_minus(m.measured.value, SIGMAS * m.measured.sigma)
+        )
+    });
+    let parts = [
+        (document.verdict != Verdict::Failed).then(|| format!("{} kept", plural(kept, "limit"))),
+        gravity,
+        document.up.as_ref().map(|up| format!("{up} up")),
+        document.duration_s.map(|s| format!("{s:.1} s")),
+        document.scale.clone(),
+    ];
+    parts.into_iter().flatten().collect::<Vec<_>>().join(", ")
 }
 
 /// The quantities beyond their limits.
 fn failures(document: &Document) -> String {
     let all: Vec<String> = document.failed().map(failure).collect();
-    let mut out = all
-        .iter()
-        .take(NAMED)
-        .cloned()
-        .collect::<Vec<_>>()
-        .join(", ");
-    if all.len() > NAMED {
-        let _ = write!(out, ", and {} more", all.len() - NAMED);
-    }
-    out
+    let more = (all.len() > NAMED).then(|| format!(", and {} more", all.len() - NAMED));
+    all[..NAMED.min(all.len())].join(", ") + &more.unwrap_or_default()
 }
 
 fn failure(m: &Measurement) -> String {
-    let value = value(m);
-    let limits = match (m.lower, m.upper) {
-        (Some(lower), Some(upper)) => format!("{} to {}", significant(lower), significant(upper)),
-        (Some(lower), None) => format!("at least {}", significant(lower)),
-        (None, Some(upper)) => format!("at most {}", significant(upper)),
+    let limits = match (m.lower.map(significant), m.upper.map(significant)) {
+        (Some(lower), Some(upper)) => format!("{lower} to {upper}"),
+        (Some(lower), None) => format!("at least {lower}"),
+        (None, Some(upper)) => format!("at most {upper}"),
         (None, None) => String::new(),
     };
-    format!("{} {value} {} ({limits})", m.measured.name, m.measured.unit)
+    format!(
+        "{} {} {} ({limits})",
+        m.measured.name,
+        value(m),
+        m.measured.unit
+    )
 }
 
 fn value(m: &Measurement) -> String {
     let (value, half) = (m.measured.value, SIGMAS * m.measured.sigma);
-    if half == 0.0 && value.fract() == 0.0 {
-        return format!("{value:.0}");
-    }
-    match half > LEAST_SHARE * value.abs() {
-        true => plus_minus(value, half),
-        false => significant(value),
+    match half {
+        0.0 if value.fract() == 0.0 => format!("{value:.0}"),
+        half if half > LEAST_SHARE * value.abs() => plus_minus(value, half),
+        _ => significant(value),
     }
 }
 
 /// Where the limits are from, each source once.
-fn sources(out: &mut String, measurements: &[Measurement]) {
-    let mut known: Vec<&str> = Vec::new();
-    for source in measurements.iter().filter_map(|m| m.limits_of.as_deref()) {
-        if known.contains(&source) {
-            continue;
+fn sources(measurements: &[Measurement]) -> Markup {
+    let mut known: Vec<(&str, Vec<&str>)> = Vec::new();
+    for (source, name) in measurements
+        .iter()
+        .filter_map(|m| Some((m.limits_of.as_deref()?, m.measured.name.as_str())))
+    {
+        match known.iter_mut().find(|(other, _)| *other == source) {
+            Some((_, names)) => names.push(name),
+            None => known.push((source, vec![name])),
         }
-        known.push(source);
-        let own = measurements
-            .iter()
-            .filter(|m| m.limits_of.as_deref() == Some(source));
-        let names: Vec<&str> = own.map(|m| m.measured.name.as_str()).collect();
-        wrap(
-            out,
-            "  limits of ",
-            &format!("{}: {source}", names.join(", ")),
-        );
     }
+    html! { @for (source, names) in known { p data-head="limits of " { (names.join(", ")) ": " (source) } } }
 }
 
-/// Whether it is a count that passes, such as of stuck bits: a summary leaves these out.
-fn is_plain_count(m: &Measurement) -> bool {
-    m.measured.sigma == 0.0 && m.passed == Some(true)
-}
-
-fn table(measurements: &[&Measurement]) -> Table {
-    let heads = ["measured, ± 2 σ", "lower", "upper"];
-    let mut table = Table::new("Measurements against their limits", "quantity")
-        .numbers(heads)
-        .words("unit")
-        .words("");
-    for m in measurements {
-        let limit = |limit: Option<f64>| limit.map_or(Cell::Empty, |v| Cell::number(v, 1.0));
-        let cells = [
-            Cell::from(m.measured.name.clone()),
-            Cell::from(value(m)),
-            limit(m.lower),
-            limit(m.upper),
-            Cell::from(m.measured.unit.clone()),
-            Cell::from(match m.passed {
-                Some(true) => "passed",
-                Some(false) => "FAILED",
-                None => "",
-            }),
-        ];
-        table.row(cells);
-    }
-    table
+fn against_limits(measurements: &[&Measurement]) -> Markup {
+    html! { (table("Measurements against their limits", &html! {
+        th { "quantity" } th.n { "measured, ± 2 σ" } th.n { "lower" } th.n { "upper" } th { "unit" } th {}
+    }, &html! { @for m in measurements { tr {
+        td { (m.measured.name) } td.n { (value(m)) }
+        @for limit in [m.lower, m.upper] { @if let Some(limit) = limit { (number(limit, 1.0)) } @else { td {} } }
+        td { (m.measured.unit) } td { @match m.passed { Some(true) => "passed", Some(false) => "FAILED", None => {} } }
+    } } })) }
 }

@@ -26,24 +26,19 @@ const CLASSES: [&str; 3] = ["x", "y", "z"];
 
 /// The curves of a single recording as SVG.
 pub fn svg(result: &AllanResult) -> String {
-    let drawn = |c: &&ChannelResult| !c.tau_s.is_empty();
     let of = |sensor: Sensor| {
-        let ours = result.channels.iter().filter(drawn);
-        ours.filter(move |c| c.sensor == sensor)
+        let ours = result.channels.iter().filter(|c| c.sensor == sensor);
+        ours.filter(|c| !c.tau_s.is_empty())
+            .collect::<Vec<&ChannelResult>>()
     };
-    let panels: Vec<(Sensor, Vec<&ChannelResult>)> = Sensor::BOTH
-        .into_iter()
-        .map(|sensor| (sensor, of(sensor).collect()))
-        .filter(|(_, channels): &(_, Vec<_>)| !channels.is_empty())
-        .collect();
+    let mut panels = Sensor::BOTH.map(|sensor| (sensor, of(sensor))).to_vec();
+    panels.retain(|(_, channels)| !channels.is_empty());
     let (width, height) = (PANEL.0 * panels.len() as f64, PANEL.1);
     let drawn = html! {
         svg xmlns="http://www.w3.org/2000/svg" width=(width) height=(height) viewBox={ "0 0 " (width) " " (height) } {
             style { (STYLE) }
             rect width=(width) height=(height) fill="#fff" {}
-            @for (k, (sensor, channels)) in panels.iter().enumerate() {
-                g transform={ "translate(" (PANEL.0 * k as f64) ")" } { (panel(result, *sensor, channels)) }
-            }
+            @for (k, (sensor, channels)) in panels.iter().enumerate() { g transform={ "translate(" (PANEL.0 * k as f64) ")" } { (panel(result, *sensor, channels)) } }
         }
     };
     drawn.into_string() + "\n"
@@ -58,87 +53,73 @@ fn panel(result: &AllanResult, sensor: Sensor, channels: &[&ChannelResult]) -> M
         channels.iter().flat_map(|c| c.adev.iter().map(|d| d * by)),
         1.6,
     );
+    let [log_x, log_y] = [&x, &y].map(|r| r.start.log10()..r.end.log10());
     let frame = Frame {
         across: 92.0..PANEL.0 - 14.0,
         down: 44.0..PANEL.1 - 60.0,
-        x: x.start.log10()..x.end.log10(),
-        y: y.start.log10()..y.end.log10(),
+        x: log_x,
+        y: log_y,
     };
-    let title = match sensor {
-        Sensor::Gyro => "Gyros",
-        Sensor::Accel => "Accelerometers",
-    };
-    let title = format!(
-        "{title} of {}",
-        result.device.as_deref().unwrap_or_default()
-    );
-    let kind = result.kind.unwrap_or_default();
-    let point = |t: f64, deviation: f64| {
-        let inside = (deviation * by).clamp(y.start, y.end);
-        (t.log10(), inside.log10())
-    };
+    let inside = |deviation: f64| (deviation * by).clamp(y.start, y.end).log10();
     let curve = |tau_s: &[f64], deviation: &[f64]| -> Vec<(f64, f64)> {
-        let each = tau_s.iter().zip(deviation);
-        each.map(|(t, d)| point(*t, *d)).collect()
+        tau_s
+            .iter()
+            .zip(deviation)
+            .map(|(t, d)| (t.log10(), inside(*d)))
+            .collect()
     };
-    let line = |class: &str, points: Vec<(f64, f64)>| frame.line(class, points.into_iter());
-    // Line style and name of each legend entry.
-    let mut key: Vec<(String, String)> = Vec::new();
-    let mut curves: Vec<Markup> = Vec::new();
+    // Line style, name and curve of an entry of the legend.
+    type Entry = (String, String, Vec<(f64, f64)>);
+    let mut entries: Vec<Entry> = Vec::new();
     for (class, channel) in CLASSES.iter().zip(channels) {
-        curves.push(line(class, curve(&channel.tau_s, &channel.adev)));
-        key.push(((*class).into(), with_values(channel)));
-        if let Some(quiet) = &channel.adev_without_lines {
-            let class = format!("{class} quiet");
-            curves.push(line(&class, curve(&channel.tau_s, quiet)));
-            key.push((class, format!("{}, lines removed", channel.name)));
-        }
-        if let Some(hadamard) = &channel.hadamard {
-            let class = format!("{class} hadamard");
-            curves.push(line(&class, curve(&hadamard.tau_s, &hadamard.hdev)));
-            key.push((class, format!("{}, Hadamard", channel.name)));
-        }
-    }
-    for (_, channel, model) in models(channels) {
-        let [from, to] = model.range_s.map(f64::log10);
-        let mut points = curve(&channel.tau_s, &model.adev);
-        points.retain(|(t, _)| (from..=to).contains(t));
-        curves.push(line("model", points));
-    }
-    if models(channels).next().is_some() {
-        key.push(("model".into(), "models".into()));
-        key.push((MARK.into(), "N at 1 s, K at 3 s, B at its floor".into()));
-        key.push((UNITS.into(), units(channels)));
-    }
-    if channels.iter().any(|c| !c.lines.is_empty()) {
-        key.push((WEDGE.into(), "lines of the spectrum".into()));
+        let (name, tau_s) = (channel.name, &channel.tau_s);
+        entries.push((
+            (*class).into(),
+            with_values(channel),
+            curve(tau_s, &channel.adev),
+        ));
+        let quiet = channel.adev_without_lines.iter();
+        entries.extend(quiet.map(|d| {
+            (
+                format!("{class} quiet"),
+                format!("{name}, lines removed"),
+                curve(tau_s, d),
+            )
+        }));
+        let hadamard = channel.hadamard.iter();
+        entries.extend(hadamard.map(|h| {
+            (
+                format!("{class} hadamard"),
+                format!("{name}, Hadamard"),
+                curve(&h.tau_s, &h.hdev),
+            )
+        }));
     }
     html! {
-        (frame.grid(&title, &decades(&x), &decades(&y), true))
+        @let sensors = if sensor == Sensor::Gyro { "Gyros" } else { "Accelerometers" };
+        (frame.grid(&format!("{sensors} of {}", result.device.as_deref().unwrap_or_default()), &decades(&x), &decades(&y), true))
         path class="axis" d={ "M" (px(frame.across.start)) " " (px(frame.down.start)) "V" (px(frame.down.end)) "H" (px(frame.across.end)) } {}
         (frame.x_name("averaging time, s", &frame))
-        (frame.y_name(&format!("{kind} deviation, {}", usual.unit)))
+        (frame.y_name(&format!("{} deviation, {}", result.kind.unwrap_or_default(), usual.unit)))
         @for (class, channel) in CLASSES.iter().zip(channels) {
-            @let high = curve(&channel.tau_s, &channel.upper);
-            @let low = curve(&channel.tau_s, &channel.lower);
-            (line(&format!("{class} band"), high.into_iter().chain(low.into_iter().rev()).collect()))
+            @let [high, low] = [&channel.upper, &channel.lower].map(|ends| curve(&channel.tau_s, ends).into_iter());
+            (frame.line(&format!("{class} band"), high.chain(low.rev())))
         }
-        @for curve in &curves { (curve) }
-        @for term in [Term::N, Term::B, Term::K] { (marks(&frame, channels, term, by)) }
+        @for (class, _, points) in &entries { (frame.line(class, points.iter().copied())) }
+        @for (_, channel, model) in models(channels) {
+            @let [from, to] = model.range_s.map(f64::log10);
+            (frame.line("model", curve(&channel.tau_s, &model.adev).into_iter().filter(|(t, _)| (from..=to).contains(t))))
+        }
+        @for term in MARKED { (marks(&frame, channels, term, by)) }
         (line_marks(&frame, channels, by))
-        (legend(&frame, &key))
+        (legend(&frame, channels, &entries.iter().map(|(class, name, _)| (class.as_str(), name.as_str())).collect::<Vec<_>>()))
     }
 }
-
-/// Entries of the legend that are no lines.
-const MARK: &str = "mark";
-const WEDGE: &str = "wedge";
-const UNITS: &str = "units";
 
 /// Terms that the picture marks.
 const MARKED: [Term; 3] = [Term::N, Term::B, Term::K];
 
-/// Name of a channel with its coefficients in [`units`].
+/// Name of a channel with its coefficients, whose units are in the legend.
 fn with_values(channel: &ChannelResult) -> String {
     let each = MARKED.into_iter().filter_map(|term| {
         let own = channel.get(term).ok()?;
@@ -150,19 +131,6 @@ fn with_values(channel: &ChannelResult) -> String {
         true => channel.name.into(),
         false => format!("{}: {}", channel.name, each.join(", ")),
     }
-}
-
-/// Units of the coefficients of `channels`.
-fn units(channels: &[&ChannelResult]) -> String {
-    let each = MARKED.into_iter().filter_map(|term| {
-        let own = channels.iter().find_map(|c| c.get(term).ok())?;
-        Some(format!(
-            "{} in {}",
-            term.letter(),
-            readable::noise(&own.unit)[0].unit
-        ))
-    });
-    each.collect::<Vec<_>>().join(", ")
 }
 
 /// A wedge whose tip is at a place, pixels.
@@ -181,58 +149,54 @@ const EDGE: f64 = 10.0;
 /// marked once.
 fn line_marks(frame: &Frame, channels: &[&ChannelResult], by: f64) -> Markup {
     let mut marks: Vec<(f64, f64)> = Vec::new();
-    for channel in channels {
-        for line in &channel.lines {
-            let t = BENT_AT / line.frequency_hz;
-            let near = |(a, b): (&f64, &f64)| ((a / t).ln().abs(), b * by);
-            let each = channel.tau_s.iter().zip(&channel.adev).map(near);
-            let Some((_, deviation)) = each.min_by(|a, b| a.0.total_cmp(&b.0)) else {
-                continue;
-            };
-            match marks
-                .iter_mut()
-                .find(|(f, _)| (f / line.frequency_hz).ln().abs() < 0.05)
-            {
-                Some((_, high)) => *high = high.max(deviation),
-                None => marks.push((line.frequency_hz, deviation)),
-            }
+    for (channel, line) in channels
+        .iter()
+        .flat_map(|c| c.lines.iter().map(move |l| (c, l)))
+    {
+        let frequency = line.frequency_hz;
+        let distance = |t: &f64| (t * frequency / BENT_AT).ln().abs();
+        let each = channel.tau_s.iter().zip(&channel.adev);
+        let nearest = each.min_by(|a, b| distance(a.0).total_cmp(&distance(b.0)));
+        let high = nearest.map_or(0.0, |(_, deviation)| deviation * by);
+        match marks
+            .iter_mut()
+            .find(|(f, _)| (*f / frequency).ln().abs() < 0.05)
+        {
+            Some((_, highest)) => *highest = highest.max(high),
+            None => marks.push((frequency, high)),
         }
     }
     // From left to right along the falling curve: the highest frequency comes first.
     marks.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let places = marks
+        .iter()
+        .map(|(f, high)| (*f, (BENT_AT / f).log10(), high.log10()));
+    let inside = places.filter(|(_, x, y)| frame.x.contains(x) && frame.y.contains(y));
     let mut labels: Vec<(f64, f64)> = Vec::new();
-    let mut place = |(f, deviation): &(f64, f64)| {
-        let (x, y) = ((BENT_AT / f).log10(), deviation.log10());
-        let inside = frame.x.contains(&x) && frame.y.contains(&y);
-        inside.then(|| {
-            let (x, y) = (frame.at_x(x), frame.at_y(y) - 5.0);
-            // Next to the wedge, but inside the frame.
-            let left = (x + 6.0).min(frame.across.end - LABEL.0);
-            let mut bottom = (y - 4.0).max(frame.down.start + LABEL.1);
-            for (other, above) in &labels {
-                if (left - other).abs() < LABEL.0 && (bottom - above).abs() < LABEL.1 {
-                    bottom = above + LABEL.1;
-                }
+    let mut place = |(f, x, y): (f64, f64, f64)| {
+        let (x, y) = (frame.at_x(x), frame.at_y(y) - 5.0);
+        // Next to the wedge, but inside the frame, and below labels that are there.
+        let left = (x + 6.0).min(frame.across.end - LABEL.0);
+        let mut bottom = (y - 4.0).max(frame.down.start + LABEL.1);
+        for (other, above) in &labels {
+            if (left - other).abs() < LABEL.0 && (bottom - above).abs() < LABEL.1 {
+                bottom = above + LABEL.1;
             }
-            labels.push((left, bottom));
-            (*f, [x, y], [left, bottom])
-        })
-    };
-    let places: Vec<_> = marks.iter().filter_map(&mut place).collect();
-    html! {
-        @for (f, [x, y], [left, bottom]) in places {
-            (wedge(x, y))
-            text class="tick" x=(px(left)) y=(px(bottom)) { (significant(f)) " Hz" }
         }
-    }
+        labels.push((left, bottom));
+        html! { (wedge(x, y)) text class="tick" x=(px(left)) y=(px(bottom)) { (significant(f)) " Hz" } }
+    };
+    html! { @for at in inside { (place(at)) } }
 }
 
 /// Marks a coefficient: a circle for each channel, and one letter above the highest circle; their values are in the legend.
 fn marks(frame: &Frame, channels: &[&ChannelResult], term: Term, by: f64) -> Markup {
-    let marks: Vec<(usize, f64, f64)> = models(channels)
-        .filter_map(|(k, channel, model)| Some((k, read_at(channel, model, term)?)))
-        .map(|(k, (t, deviation))| (k, t.log10(), (deviation * by).log10()))
-        .filter(|(_, x, y)| frame.x.contains(x) && frame.y.contains(y))
+    let places = models(channels).filter_map(|(k, channel, model)| {
+        let (t, deviation) = read_at(channel, model, term)?;
+        Some((k, t.log10(), (deviation * by).log10()))
+    });
+    let inside = places.filter(|(_, x, y)| frame.x.contains(x) && frame.y.contains(y));
+    let marks: Vec<(usize, f64, f64)> = inside
         .map(|(k, x, y)| (k, frame.at_x(x), frame.at_y(y)))
         .collect();
     html! {
@@ -244,23 +208,44 @@ fn marks(frame: &Frame, channels: &[&ChannelResult], term: Term, by: f64) -> Mar
     }
 }
 
-/// The legend is at the upper right, where falling curves leave space.
-fn legend(frame: &Frame, key: &[(String, String)]) -> Markup {
+/// The legend is at the upper right, where falling curves leave space: the curves, and what the marks mean.
+fn legend(frame: &Frame, channels: &[&ChannelResult], curves: &[(&str, &str)]) -> Markup {
+    let known = |term| channels.iter().find_map(|c| c.get(term).ok());
+    let unit = |term: Term| {
+        Some((
+            term.letter(),
+            readable::noise(&known(term)?.unit).remove(0).unit,
+        ))
+    };
+    let units = MARKED
+        .into_iter()
+        .filter_map(unit)
+        .map(|(letter, unit)| format!("{letter} in {unit}"));
+    let units = units.collect::<Vec<_>>().join(", ");
+    let mut key = curves.to_vec();
+    if models(channels).next().is_some() {
+        key.extend([
+            ("model", "models"),
+            ("mark", "N at 1 s, K at 3 s, B at its floor"),
+            ("", &units),
+        ]);
+    }
+    if channels.iter().any(|c| !c.lines.is_empty()) {
+        key.push(("wedge", "lines of the spectrum"));
+    }
     let letters = key.iter().map(|(_, name)| name.chars().count()).max();
-    let (width, height) = (
-        46.0 + 7.6 * letters.unwrap_or(0) as f64,
-        10.0 + 18.0 * key.len() as f64,
-    );
+    let width = 46.0 + 7.6 * letters.unwrap_or(0) as f64;
+    let height = 10.0 + 18.0 * key.len() as f64;
     let (left, top) = (frame.across.end - 6.0 - width, frame.down.start + 6.0);
     html! {
         rect class="key" x=(px(left)) y=(px(top)) width=(px(width)) height=(px(height)) {}
         @for (row, (class, name)) in key.iter().enumerate() {
             @let y = top + 14.0 + 18.0 * row as f64;
-            @match class.as_str() {
-                MARK => circle class="line" cx=(px(left + 20.0)) cy=(px(y)) r="4" {},
-                WEDGE => (wedge(left + 20.0, y + 4.0)),
-                UNITS => {},
-                _ => path class=(class) d={ "M" (px(left + 8.0)) " " (px(y)) "h24" } {},
+            @match *class {
+                "mark" => circle class="line" cx=(px(left + 20.0)) cy=(px(y)) r="4" {},
+                "wedge" => (wedge(left + 20.0, y + 4.0)),
+                "" => {},
+                class => path class=(class) d={ "M" (px(left + 8.0)) " " (px(y)) "h24" } {},
             }
             text x=(px(left + 38.0)) y=(px(y + 5.0)) { (name) }
         }
@@ -269,23 +254,22 @@ fn legend(frame: &Frame, key: &[(String, String)]) -> Markup {
 
 /// Range of positive values, extended by the factor `room`.
 fn ends(values: impl Iterator<Item = f64>, room: f64) -> Range<f64> {
-    let (low, high) = values
-        .filter(|v| v.is_finite() && *v > 0.0)
-        .fold((f64::INFINITY, 0.0f64), |(low, high), v| {
-            (low.min(v), high.max(v))
-        });
-    match low < high {
-        true => low / room..high * room,
-        false => 0.5..2.0,
+    let positive: Vec<f64> = values.filter(|v| v.is_finite() && *v > 0.0).collect();
+    let low = positive.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = positive.iter().copied().fold(0.0, f64::max);
+    if low < high {
+        low / room..high * room
+    } else {
+        0.5..2.0
     }
 }
 
 /// Channels with a model, and their indices.
 fn models<'a>(
-    channels: &'a [&'a ChannelResult],
+    of: &'a [&ChannelResult],
 ) -> impl Iterator<Item = (usize, &'a ChannelResult, &'a ModelResult)> {
-    let with_model = |(k, c): (usize, &&'a ChannelResult)| Some((k, *c, c.model.as_ref()?));
-    channels.iter().enumerate().filter_map(with_model)
+    let each = of.iter().enumerate();
+    each.filter_map(|(k, c)| Some((k, *c, c.model.as_ref()?)))
 }
 
 /// Averaging time and deviation at which the plot marks a coefficient: N at 1 s, K at 3 s, and B where the model reaches its floor.
@@ -294,10 +278,10 @@ fn read_at(channel: &ChannelResult, model: &ModelResult, term: Term) -> Option<(
     match term {
         Term::N => Some((1.0, value)),
         Term::K => Some((3.0, value)),
-        Term::B => {
-            let floor_s = channel.useful_average_s.unwrap_or(model.range_s[1]);
-            Some((floor_s, value * FLOOR.sqrt()))
-        }
+        Term::B => Some((
+            channel.useful_average_s.unwrap_or(model.range_s[1]),
+            value * FLOOR.sqrt(),
+        )),
         Term::Q | Term::R => None,
     }
 }

@@ -6,10 +6,11 @@ mod results;
 use maud::{Markup, html};
 use mimu::certificate::{Certificate, Party};
 use mimu::quantity::{Sensor, significant};
-use mimu_recording::Reference;
+use mimu_recording::{Reference, ReferenceError};
 
 use super::data_sheet;
 use super::page::{Made, spoken, styled_page, written};
+use super::table::{table, typed};
 
 const STYLE: &str = include_str!("certificate/style.css");
 
@@ -18,24 +19,15 @@ pub fn certificate_page(certificate: &Certificate, file: Option<&str>, made: &Ma
     let number = &certificate.particulars.number;
     let main = html! {
         (head(certificate))
-        h2 { "1 Item" }
-        (item(certificate))
-        h2 { "2 Method" }
-        (method(certificate))
-        h2 { "3 Conditions" }
-        (conditions(certificate))
-        h2 { "4 Reference and its traceability" }
-        (reference(certificate))
-        h2 { "5 Results" }
-        (results::section(certificate))
-        h2 { "6 As found and as left" }
-        (comparison::section(certificate.as_found.as_ref()))
-        h2 { "7 Budget of influences" }
-        (results::budget(certificate))
-        h2 { "8 Statement of conformity" }
-        (conformity(certificate))
-        h2 { "9 Remarks" }
-        (remarks(certificate, file))
+        h2 { "1 Item" } (item(certificate))
+        h2 { "2 Method" } (method(certificate))
+        h2 { "3 Conditions" } (conditions(certificate))
+        h2 { "4 Reference and its traceability" } (reference(certificate))
+        h2 { "5 Results" } (results::section(certificate))
+        h2 { "6 As found and as left" } (comparison::section(certificate.as_found.as_ref()))
+        h2 { "7 Budget of influences" } (results::budget(certificate))
+        h2 { "8 Statement of conformity" } (conformity(certificate))
+        h2 { "9 Remarks" } (remarks(certificate, file))
         (signatures(certificate))
         p class="dim end" { "End of certificate " (number) ". " (certificate.tool) ", " (made.created) ": " code { (made.command) } }
     };
@@ -65,12 +57,7 @@ fn css_text(text: &str) -> String {
 }
 
 fn party(heading: &str, party: &Party) -> Markup {
-    html! {
-        section {
-            h3 { (heading) }
-            p { strong { (party.name) } br; (lines(&party.address)) @if !party.reference.is_empty() { br; (party.reference) } }
-        }
-    }
+    html! { section { h3 { (heading) } p { strong { (party.name) } br; (lines(&party.address)) @if !party.reference.is_empty() { br; (party.reference) } } } }
 }
 
 /// Text with its line breaks.
@@ -96,45 +83,27 @@ fn head(certificate: &Certificate) -> Markup {
 
 fn item(certificate: &Certificate) -> Markup {
     let item = &certificate.particulars.item;
-    html! {
-        dl {
-            dt { "Description" } dd { (item.description) }
-            dt { "Identification" } dd {
-                (item.identification) "; in the recording " (certificate.device)
-                @if let Some(id) = &certificate.unit_id { ", number " code { (id) } }
-            }
-            dt { "Condition" } dd { (item.condition) }
-            @if !item.settings.is_empty() { dt { "Settings" } dd { (item.settings) } }
-            @if let Some(settings) = &certificate.settings {
-                @for (sensor, set) in [(Sensor::Gyro, &settings.gyro), (Sensor::Accel, &settings.accel)] {
-                    dt { "Part, " (spoken(sensor)) }
-                    dd {
-                        (set.part) ", range " (significant(set.range)) " " (sensor.unit().replace("^2", "²")) ", " (set.bits) " bits, " (set.filter)
-                    }
-                }
-            }
-        }
-    }
+    html! { dl {
+        dt { "Description" } dd { (item.description) }
+        dt { "Identification" } dd { (item.identification) "; in the recording " (certificate.device) @if let Some(id) = &certificate.unit_id { ", number " code { (id) } } }
+        dt { "Condition" } dd { (item.condition) }
+        @if !item.settings.is_empty() { dt { "Settings" } dd { (item.settings) } }
+        @if let Some(settings) = &certificate.settings { @for (sensor, set) in [(Sensor::Gyro, &settings.gyro), (Sensor::Accel, &settings.accel)] {
+            dt { "Part, " (spoken(sensor)) }
+            dd { (set.part) ", range " (significant(set.range)) " " (sensor.unit().replace("^2", "²")) ", " (set.bits) " bits, " (set.filter) }
+        } }
+    } }
 }
 
 fn method(certificate: &Certificate) -> Markup {
-    let known = match certificate.reference {
-        Reference::Table => {
-            "The input of each dwell is known: rates of a table, gravity in known poses."
-        }
-        Reference::Gravity => {
-            "The unit lies still in many poses and is turned from one to the next. The reference of the accelerometer is the magnitude of gravity; that of the gyro is the direction of gravity before and after each turn."
-        }
-        Reference::TurntableRate => {
-            "The unit turns on a turntable of known rates in many poses. The reference of the gyro is the magnitude of the rate, that of the accelerometer the magnitude of gravity."
-        }
-    };
     html! {
-        p { (known) }
+        p { @match certificate.reference {
+            Reference::Table => "The input of each dwell is known: rates of a table, gravity in known poses.",
+            Reference::Gravity => "The unit lies still in many poses and is turned from one to the next. The reference of the accelerometer is the magnitude of gravity; that of the gyro is the direction of gravity before and after each turn.",
+            Reference::TurntableRate => "The unit turns on a turntable of known rates in many poses. The reference of the gyro is the magnitude of the rate, that of the accelerometer the magnitude of gravity.",
+        } }
         dl {
-            @for (sensor, of) in certificate.sensors.present() {
-                dt { "Estimator, " (spoken(sensor)) } dd { (of.estimator) }
-            }
+            @for (sensor, of) in certificate.sensors.present() { dt { "Estimator, " (spoken(sensor)) } dd { (of.estimator) } }
             dt { "Model" } dd {
                 "u = P x + b with P = K Mo Mp: three scale factors K, three biases b, three misalignments Mp, three non-orthogonalities Mo of each triad. "
                 "u is the reading, x the input (rad/s, m/s²)."
@@ -199,21 +168,20 @@ fn reference(certificate: &Certificate) -> Markup {
         @match error {
             Some(error) => {
                 @if !error.source.is_empty() { p { "Source of the figures: " (error.source) "." } }
-                div class="scroll" { table {
-                    caption { "Uncertainty of the reference, type B; each is common to all dwells, except the level of a pose" }
-                    thead { tr { th { "quantity" } th class="n" { "value" } th { "unit" } th { "distribution" } } }
-                    tbody { @for (key, value, rectangular) in error.stated() {
-                        @let (name, unit) = named(key);
-                        tr {
-                            td { (name) } td class="n" { data value=(value) { "±" (written(&significant(value))) } } td { (unit) }
-                            td { @if rectangular { "rectangular, limits" } @else { "normal, 95 % interval" } }
-                        }
-                    } }
-                } }
+                (uncertainties(error))
             }
             None => p { strong { "No uncertainty of the reference was stated." } " The uncertainties below contain noise and scatter only." }
         }
     }
+}
+
+fn uncertainties(error: &ReferenceError) -> Markup {
+    html! { (table("Uncertainty of the reference, type B; each is common to all dwells, except the level of a pose", &html! {
+        th { "quantity" } th.n { "value" } th { "unit" } th { "distribution" }
+    }, &html! { @for (key, value, rectangular) in error.stated() {
+        @let (name, unit) = named(key);
+        tr { td { (name) } (typed(value, &format!("±{}", significant(value)))) td { (unit) } td { @if rectangular { "rectangular, limits" } @else { "normal, 95 % interval" } } }
+    } })) }
 }
 
 fn conformity(certificate: &Certificate) -> Markup {
@@ -245,13 +213,9 @@ fn remarks(certificate: &Certificate, file: Option<&str>) -> Markup {
 
 fn signatures(certificate: &Certificate) -> Markup {
     let p = &certificate.particulars;
-    html! {
-        div class="signatures" {
-            @for (what, who) in [("Calibrated by", &p.calibrated_by), ("Authorised by", &p.authorised_by)] {
-                div { div class="line" {} p { (what) ": " (who) } p class="dim" { "Date, signature" } }
-            }
-        }
-    }
+    html! { div.signatures { @for (what, who) in [("Calibrated by", &p.calibrated_by), ("Authorised by", &p.authorised_by)] {
+        div { div.line {} p { (what) ": " (who) } p.dim { "Date, signature" } }
+    } } }
 }
 
 #[cfg(test)]

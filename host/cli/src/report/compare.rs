@@ -1,112 +1,61 @@
-//! Result of `mimu compare` as text.
+//! Result of `mimu compare`.
 
-use std::fmt::Write as _;
-
+use maud::{Markup, html};
 use mimu::calibration::comparison::{ComparedParameter, Comparison};
-use mimu::quantity::{p_value, plus_minus, significant};
+use mimu::quantity::p_value;
 use mimu::readable;
+
+use super::table::{interval, number, rounded, table, with_unit};
+use super::terminal::text;
 
 /// Two files side by side with their difference, or the range of several.
 pub fn compare_text(result: &Comparison, all: bool) -> String {
-    let mut out = String::new();
-    let changed = result.parameters.iter().filter(|p| p.changed).count();
-    let judged = result.parameters.iter().filter(|p| p.p.is_some()).count();
-    let _ = match (judged, changed) {
-        (0, _) => writeln!(
-            out,
-            "{} calibrations without uncertainties: no change can be judged",
-            result.files.len()
-        ),
-        (_, 0) => writeln!(
-            out,
-            "{} calibrations: none of {judged} parameters changed by more than their intervals explain",
-            result.files.len()
-        ),
-        _ => writeln!(
-            out,
-            "{} calibrations: {changed} of {judged} parameters changed by more than their intervals explain (*)",
-            result.files.len()
-        ),
-    };
+    let count =
+        |of: fn(&ComparedParameter) -> bool| result.parameters.iter().filter(|p| of(p)).count();
+    let (changed, judged) = (count(|p| p.changed), count(|p| p.p.is_some()));
     let shown = |p: &&ComparedParameter| all || judged == 0 || p.changed;
     let shown: Vec<&ComparedParameter> = result.parameters.iter().filter(shown).collect();
-    if !shown.is_empty() {
-        let two = result.files.len() == 2;
-        let head = match two {
-            true => ["first", "second", "difference"],
-            false => ["mean", "spread, 1 σ", "repeatability"],
-        };
-        let _ = writeln!(
-            out,
-            "\n{:<42} {:>13} {:>13} {:>17}  chance",
-            "", head[0], head[1], head[2]
-        );
-        for p in shown {
-            let _ = writeln!(out, "{}", row(p, two));
+    let two = result.files.len() == 2;
+    text(&html! {
+        p {
+            (result.files.len()) " calibrations"
+            @match (judged, changed) {
+                (0, _) => " without uncertainties: no change can be judged",
+                (_, 0) => { ": none of " (judged) " parameters changed by more than their intervals explain" }
+                _ => { ": " (changed) " of " (judged) " parameters changed by more than their intervals explain (*)" }
+            }
         }
-        if !two {
-            out += "\nrepeatability: the spread beyond the uncertainty of the fits, 1 σ\n";
+        @if !shown.is_empty() {
+            h2 { "Parameters" }
+            (parameters(&shown, two))
+            @if !two { hr; p { "repeatability: the spread beyond the uncertainty of the fits, 1 σ" } }
         }
-    }
-    for (file, judgement) in result.files.iter().zip(&result.judgements) {
-        if let Some(judgement) = judgement.as_ref().filter(|j| !j.is_good()) {
-            let _ = writeln!(out, "{file}: {judgement}");
+        @for (file, judgement) in result.files.iter().zip(&result.judgements) {
+            @if let Some(judgement) = judgement.as_ref().filter(|j| !j.is_good()) { p.line { (file) ": " (judgement) } }
         }
-    }
-    for note in &result.notes {
-        let _ = writeln!(out, "note: {note}");
-    }
-    out
+        ul class="lines" data-head="note: " { @for note in &result.notes { li { (note) } } }
+    })
 }
 
-fn row(p: &ComparedParameter, two: bool) -> String {
-    let effect = p.name.contains('_');
-    let readable = match effect {
-        true => readable::coefficient(&p.unit),
-        false => readable::parameter(&p.unit),
+fn parameters(shown: &[&ComparedParameter], two: bool) -> Markup {
+    let heads = if two {
+        ["first", "second", "difference"]
+    } else {
+        ["mean", "spread, 1 σ", "repeatability"]
     };
-    let mark = if p.changed { "*" } else { " " };
-    let unit = match readable.unit.is_empty() {
-        true => String::new(),
-        false => format!(", {}", readable.unit),
-    };
-    // An effect's id begins with its sensor.
-    let name = match effect {
-        true => format!("{}{unit}", p.name),
-        false => format!("{} {}{unit}", p.sensor, p.name),
-    };
-    let by = readable.factor;
-    let chance = p.p.map_or_else(String::new, p_value);
-    let cells = match two {
-        true => {
-            let difference = (p.values[1] - p.values[0]) * by;
-            let half = p.sigmas.as_ref().map(|s| 1.96 * s[0].hypot(s[1]) * by);
-            let digits = |v: f64| match half {
-                // With as many digits as the interval.
-                Some(half) => plus_minus(v * by, half)
-                    .split(' ')
-                    .next()
-                    .unwrap_or("")
-                    .into(),
-                None => significant(v * by),
-            };
-            let difference = match half {
-                Some(half) => plus_minus(difference, half),
-                None => significant(difference),
-            };
-            [digits(p.values[0]), digits(p.values[1]), difference]
+    html! { (table("Parameters that changed", &html! { th {} @for head in heads { th.n { (head) } } th { "chance" } }, &html! { @for p in shown {
+        // An effect's id begins with its sensor.
+        @let is_effect = p.name.contains('_');
+        @let unit = if is_effect { readable::coefficient(&p.unit) } else { readable::parameter(&p.unit) };
+        @let factor = unit.factor;
+        tr {
+            td { @if p.changed { "* " } @else { "  " } @if !is_effect { (p.sensor) " " } (with_unit(&p.name, &unit)) }
+            @match p.difference() {
+                Some((difference, Some(half))) => { @for value in &p.values { (rounded(*value, half, factor)) } (interval(difference, half, factor)) }
+                Some((difference, None)) => { @for value in &p.values { (number(*value, factor)) } (number(difference, factor)) }
+                None => { (rounded(p.mean, p.spread, factor)) (number(p.spread, factor)) @if let Some(r) = p.repeatability { (number(r, factor)) } @else { td {} } }
+            }
+            td { (p.p.map_or_else(String::new, p_value)) }
         }
-        false => [
-            plus_minus(p.mean * by, p.spread * by)
-                .split(' ')
-                .next()
-                .unwrap_or("")
-                .into(),
-            significant(p.spread * by),
-            p.repeatability
-                .map_or_else(String::new, |r| significant(r * by)),
-        ],
-    };
-    let [a, b, c] = cells;
-    format!("{mark} {name:<40} {a:>13} {b:>13} {c:>17}  {chance}")
+    } })) }
 }

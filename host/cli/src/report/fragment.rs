@@ -7,6 +7,7 @@ use mimu::calibration::Calibration;
 use mimu::calibration::verify::Verification;
 use mimu::fit::Fit;
 use mimu::in_use::NoiseInUse;
+use mimu::quantity::Sensor;
 use mimu::result::allan::AllanResult;
 use mimu::result::diagnosis::DiagnosisResult;
 use mimu::result::fit::FitResult;
@@ -14,25 +15,18 @@ use mimu::result::sessions::SessionsResult;
 use mimu_recording::error::Result;
 use mimu_thermal::result::ThermalResult;
 
-use super::page::{Made, STYLE, judged};
-use super::{allan_plot, diagnosis, fit, noise_in_use, sessions_text, thermal_page, unit, verify};
-use crate::hint;
-use crate::output::now;
+use super::page::{Level, Made, STYLE};
+use super::{allan, allan_plot, diagnosis, fit, noise_in_use, sessions, thermal, unit, verify};
 
-/// A fit: errors, parameters, poses and readings.
+/// A fit, with the matrices of its calibration, poses and readings.
 pub fn of_fit(fit: &Fit, result: &FitResult, calibration: &Calibration) -> String {
-    let prepared = &fit.prepared;
     fragment(&html! {
-        h1 { "Calibration of " (result.device) }
-        (judged(&result.judgement))
-        (fit::errors(result).html())
-        (unit::model::section(calibration))
-        (unit::poses::figure(prepared, calibration, None))
-        (unit::trace::figure(prepared))
-        @if !result.warnings.is_empty() {
-            h2 { "To know" }
-            ul { @for warning in &result.warnings { li { (hint::of_warning(warning)) } } }
+        (fit::document(result, Level::Page))
+        @for sensor in Sensor::BOTH {
+            @if let Some(table) = calibration.table(sensor) { (unit::model::matrix(sensor, table, &calibration.effects_of(sensor))) }
         }
+        (unit::poses::figure(&fit.prepared, calibration, None))
+        (unit::trace::figure(&fit.prepared))
     })
 }
 
@@ -47,36 +41,27 @@ pub fn of_diagnosis(result: &DiagnosisResult, made: &Made) -> Result<String> {
 /// Noise: coefficients and curves.
 pub fn of_allan(result: &AllanResult) -> String {
     fragment(&html! {
-        h1 { "Noise of " (result.device.as_deref().unwrap_or("a unit")) }
-        @if let Some(judgement) = &result.judgement { (judged(judgement)) }
-        @if let Some(noise) = result.noise_file(&now()) { (unit::noise::section(&noise)) }
+        (allan::document(result, Level::Page))
         // As an image: otherwise the drawing's style would apply to the whole page.
         @if result.recordings.len() == 1 {
             img alt="Allan deviation with its fitted model" style="max-width:100%" src=(data_url(&allan_plot::svg(result))) {}
         }
-        @if !result.warnings.is_empty() { ul { @for warning in &result.warnings { li { (warning) } } } }
     })
 }
 
 /// Noise in use: densities, consistency and causes.
 pub fn of_noise_in_use(result: &NoiseInUse) -> String {
-    fragment(&html! {
-        h1 { "Noise in use of " (result.device) }
-        (judged(&result.judgement))
-        @for table in noise_in_use::tables(result) { (table.html()) }
-        @for sentence in &result.sentences { p { (sentence) } }
-        @if !result.warnings.is_empty() { ul { @for warning in &result.warnings { li { (warning.to_string()) } } } }
-    })
+    fragment(&noise_in_use::document(result))
 }
 
-/// A calibration of several sessions, as the command prints it.
+/// A calibration of several sessions.
 pub fn of_sessions(result: &SessionsResult) -> String {
-    fragment(&html! { pre { (sessions_text(result, true)) } })
+    fragment(&sessions::document(result, Level::Page))
 }
 
 /// A fit over temperature, as on its page.
 pub fn of_thermal(result: &ThermalResult, made: &Made) -> String {
-    fragment(&thermal_page::body(result, made))
+    fragment(&thermal::document(result, Level::Page, Some(made)))
 }
 
 /// A result as the command prints it.
@@ -86,14 +71,10 @@ pub fn of_text(text: &str) -> String {
 
 /// A verification with the recording `name`.
 pub fn of_verification(name: &str, verification: &Verification) -> String {
-    let one = [(name.to_owned(), verification.clone())];
-    fragment(&html! {
-        (judged(&verification.judgement))
-        (verify::errors(&one, true).html())
-        @if !verification.warnings.is_empty() {
-            ul { @for warning in &verification.warnings { li { (warning.to_string()) } } }
-        }
-    })
+    fragment(&verify::document(
+        &[(name.to_owned(), verification.clone())],
+        Level::Page,
+    ))
 }
 
 /// A calibration: its parameters, and its curves over temperature.

@@ -9,7 +9,7 @@ use mimu::recording_problem::OfRecording;
 use mimu_recording::error::Error;
 use serde::Serialize;
 
-use super::text;
+use super::page::problems_text;
 use crate::output::{coloured, show};
 
 /// JSON on standard output of a command that refused.
@@ -35,8 +35,7 @@ static PROBLEMS: Mutex<Vec<OfRecording>> = Mutex::new(Vec::new());
 
 /// Lists the faults of refused recordings on standard error, before the error line, and keeps them for [`print_refusal`].
 pub(crate) fn refused(problems: &[OfRecording], several: bool) {
-    let mut out = String::new();
-    text::problems(&mut out, problems, several, true);
+    let out = problems_text(problems, several, true);
     let mut to = AutoStream::auto(std::io::stderr().lock());
     // If standard error cannot be written, the error line cannot be shown either.
     let _ = to.write_all(coloured(&out).as_bytes());

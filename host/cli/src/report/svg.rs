@@ -1,7 +1,6 @@
 //! Drawings as SVG with colours from a style sheet, because a page is read in dark mode and printed on white. The crate plotters is not used: it
 //! writes colours into every element.
 
-use std::fmt::Write as _;
 use std::ops::Range;
 
 use maud::{Markup, html};
@@ -55,14 +54,8 @@ impl Frame {
         let (left, right) = (self.across.start, self.across.end);
         let (top, bottom) = (self.down.start, self.down.end);
         html! {
-            path class="grid" d=(y.iter().fold(String::new(), |mut d, (y, _)| {
-                let _ = write!(d, "M{left:.1} {:.1}H{right:.1}", self.at_y(*y));
-                d
-            })) {}
-            path class="grid" d=(x.iter().fold(String::new(), |mut d, (x, _)| {
-                let _ = write!(d, "M{:.1} {top:.1}V{bottom:.1}", self.at_x(*x));
-                d
-            })) {}
+            path class="grid" d=(y.iter().map(|(y, _)| format!("M{left:.1} {:.1}H{right:.1}", self.at_y(*y))).collect::<String>()) {}
+            path class="grid" d=(x.iter().map(|(x, _)| format!("M{:.1} {top:.1}V{bottom:.1}", self.at_x(*x))).collect::<String>()) {}
             @for (x, label) in x {
                 text class="tick" x=(px(self.at_x(*x))) y=(px(bottom + 14.0)) text-anchor="middle" { (label) }
             }
@@ -77,61 +70,49 @@ impl Frame {
 
     /// Name of the abscissa, centred between this frame and `last`, which may be the same.
     pub fn x_name(&self, name: &str, last: &Self) -> Markup {
-        let (x, y) = (
-            0.5 * (self.across.start + last.across.end),
-            self.down.end + 31.0,
-        );
-        html! { text class="name" x=(px(x)) y=(px(y)) text-anchor="middle" { (name) } }
+        let middle = 0.5 * (self.across.start + last.across.end);
+        html! { text class="name" x=(px(middle)) y=(px(self.down.end + 31.0)) text-anchor="middle" { (name) } }
     }
 
     /// Name of the ordinate, rotated, next to the numbers.
     pub fn y_name(&self, name: &str) -> Markup {
         // Its letters reach 12 pixels to the left of it.
-        let (x, y) = (16.0, 0.5 * (self.down.start + self.down.end));
-        html! {
-            text class="name" x=(px(x)) y=(px(y)) text-anchor="middle"
-                transform={ "rotate(-90 " (px(x)) " " (px(y)) ")" } { (name) }
-        }
+        let (x, y) = (px(16.0), px(0.5 * (self.down.start + self.down.end)));
+        html! { text class="name" x=(x) y=(y) text-anchor="middle" transform={ "rotate(-90 " (x) " " (y) ")" } { (name) } }
     }
 
     /// Round marks.
     pub fn dots(&self, class: &str, points: impl Iterator<Item = (f64, f64)>) -> Markup {
         // A line of zero length with round ends takes a tenth of the bytes of a circle.
-        let d = self.path(points, |d, x, y| write!(d, "M{x:.1} {y:.1}h0"));
-        html! { path class=(class) d=(d) {} }
+        self.path(class, points, |_, x, y| format!("M{x:.1} {y:.1}h0"))
     }
 
     /// Unfilled diamonds.
     pub fn diamonds(&self, class: &str, points: impl Iterator<Item = (f64, f64)>) -> Markup {
-        let d = self.path(points, |d, x, y| {
-            write!(d, "M{x:.1} {:.1}l3.4 3.4l-3.4 3.4l-3.4 -3.4z", y - 3.4)
-        });
-        html! { path class=(class) d=(d) {} }
+        let diamond = |x, top| format!("M{x:.1} {top:.1}l3.4 3.4l-3.4 3.4l-3.4 -3.4z");
+        self.path(class, points, |_, x, y| diamond(x, y - 3.4))
     }
 
     /// Vertical bars: abscissa, middle, half-length.
     pub fn bars(&self, class: &str, bars: impl Iterator<Item = (f64, f64, f64)>) -> Markup {
-        let mut d = String::new();
-        for (x, y, half) in bars.filter(|b| b.0.is_finite() && b.1.is_finite()) {
-            let [low, high] =
-                [y - half, y + half].map(|v| self.at_y(v.clamp(self.y.start, self.y.end)));
-            let _ = write!(d, "M{:.1} {low:.1}V{high:.1}", self.at_x(x));
-        }
-        html! { path class=(class) d=(d) {} }
+        let at = |y: f64| self.at_y(y.clamp(self.y.start, self.y.end));
+        let known = bars.filter(|(x, y, _)| x.is_finite() && y.is_finite());
+        let bar = |(x, y, half)| {
+            format!(
+                "M{:.1} {:.1}V{:.1}",
+                self.at_x(x),
+                at(y - half),
+                at(y + half)
+            )
+        };
+        html! { path class=(class) d=(known.map(bar).collect::<String>()) {} }
     }
 
     /// A line through points.
     pub fn line(&self, class: &str, points: impl Iterator<Item = (f64, f64)>) -> Markup {
-        let mut begun = false;
-        let d = self.path(points, |d, x, y| {
-            let letter = if std::mem::replace(&mut begun, true) {
-                'L'
-            } else {
-                'M'
-            };
-            write!(d, "{letter}{x:.1} {y:.1}")
-        });
-        html! { path class=(class) d=(d) {} }
+        self.path(class, points, |k, x, y| {
+            format!("{}{x:.1} {y:.1}", if k == 0 { 'M' } else { 'L' })
+        })
     }
 
     /// The area between two lines: abscissa, lower and upper ordinate.
@@ -144,59 +125,45 @@ impl Frame {
 
     /// Shades every second segment between `ends`.
     pub fn stretches(&self, class: &str, ends: &[f64]) -> Markup {
-        let (top, height) = (self.down.start, self.down.end - self.down.start);
-        let after = ends.get(1..).unwrap_or_default();
-        let right = after.iter().copied().chain([self.x.end]);
-        html! {
-            @for (from, to) in ends.iter().zip(right).step_by(2) {
-                @let (from, to) = (self.at_x(*from), self.at_x(to));
-                rect class=(class) x=(px(from)) y=(px(top)) width=(px(to - from)) height=(px(height)) {}
-            }
-        }
+        let after = ends.iter().skip(1).copied().chain([self.x.end]);
+        let all: Vec<(f64, f64)> = ends.iter().copied().zip(after).step_by(2).collect();
+        self.spans(class, &all)
     }
 
     /// Shades the spans between pairs of abscissas.
     pub fn spans(&self, class: &str, spans: &[(f64, f64)]) -> Markup {
         let (top, height) = (self.down.start, self.down.end - self.down.start);
-        html! {
-            @for (from, to) in spans {
-                @let (from, to) = (self.at_x(*from), self.at_x(*to));
-                rect class=(class) x=(px(from)) y=(px(top)) width=(px(to - from)) height=(px(height)) {}
-            }
-        }
+        html! { @for (from, to) in spans {
+            @let (from, to) = (self.at_x(*from), self.at_x(*to));
+            rect class=(class) x=(px(from)) y=(px(top)) width=(px(to - from)) height=(px(height)) {}
+        } }
     }
 
     /// Class and name of each line, to the right of the heading.
     pub fn legend(&self, entries: &[(&str, &str)]) -> Markup {
-        let widths = entries
-            .iter()
-            .map(|(_, name)| 30.0 + 6.6 * name.chars().count() as f64);
-        let mut left = self.across.end - widths.clone().sum::<f64>();
-        let lefts: Vec<f64> = widths
-            .map(|width| {
-                left += width;
-                left - width
-            })
-            .collect();
+        let width = |(_, name): &(&str, &str)| 30.0 + 6.6 * name.chars().count() as f64;
+        let left = |k: usize| self.across.end - entries[k..].iter().map(width).sum::<f64>();
         let y = self.down.start - 12.0;
-        html! {
-            @for ((class, name), left) in entries.iter().zip(lefts) {
-                path class=(class) d={ "M" (px(left + 6.0)) " " (px(y)) "h14" } {}
-                text class="tick" x=(px(left + 24.0)) y=(px(y + 3.5)) { (name) }
-            }
-        }
+        html! { @for (k, (class, name)) in entries.iter().enumerate() {
+            path class=(class) d={ "M" (px(left(k) + 6.0)) " " (px(y)) "h14" } {}
+            text class="tick" x=(px(left(k) + 24.0)) y=(px(y + 3.5)) { (name) }
+        } }
     }
 
+    /// Marks at points, by their number and place in pixels.
     fn path(
         &self,
+        class: &str,
         points: impl Iterator<Item = (f64, f64)>,
-        mut mark: impl FnMut(&mut String, f64, f64) -> std::fmt::Result,
-    ) -> String {
-        let mut d = String::new();
-        for (x, y) in points.filter(|p| p.0.is_finite() && p.1.is_finite()) {
-            let _ = mark(&mut d, self.at_x(x), self.at_y(y));
-        }
-        d
+        mark: impl Fn(usize, f64, f64) -> String,
+    ) -> Markup {
+        let known = points
+            .filter(|(x, y)| x.is_finite() && y.is_finite())
+            .enumerate();
+        let d: String = known
+            .map(|(k, (x, y))| mark(k, self.at_x(x), self.at_y(y)))
+            .collect();
+        html! { path class=(class) d=(d) {} }
     }
 }
 
@@ -240,11 +207,8 @@ impl Panel {
 pub fn decades(range: &Range<f64>) -> Vec<(f64, String)> {
     let many = (range.end / range.start).log10() > 2.5;
     let factors: &[i32] = if many { &[1] } else { &[1, 2, 5] };
-    let (low, high) = (
-        range.start.log10().floor() as i32,
-        range.end.log10().ceil() as i32,
-    );
-    let all = (low..=high).flat_map(|power| factors.iter().map(move |f| (*f, power)));
+    let powers = range.start.log10().floor() as i32..=range.end.log10().ceil() as i32;
+    let all = powers.flat_map(|power| factors.iter().map(move |f| (*f, power)));
     let each = all.filter_map(|(factor, power)| {
         let value: f64 = format!("{factor}e{power}").parse().ok()?;
         let label = match power {
@@ -263,19 +227,14 @@ pub fn px(v: f64) -> String {
 
 /// The range of `values` with a margin; never empty.
 pub fn range(values: impl Iterator<Item = f64>) -> Range<f64> {
-    let (low, high) = values
-        .filter(|v| v.is_finite())
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
-            (l.min(v), h.max(v))
-        });
-    if !(low <= high) {
-        return -1.0..1.0;
+    let known: Vec<f64> = values.filter(|v| v.is_finite()).collect();
+    let low = known.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = known.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    match high - low {
+        width if width > 0.0 => low - 0.06 * width..high + 0.06 * width,
+        0.0 => low - high.abs().max(1e-12)..high + high.abs().max(1e-12),
+        _ => -1.0..1.0,
     }
-    let room = match high - low {
-        width if width > 0.0 => 0.06 * width,
-        _ => high.abs().max(1e-12),
-    };
-    low - room..high + room
 }
 
 /// Power of ten for the numbers of an axis with these ends: 0, or such that the numbers have few digits.
@@ -297,15 +256,10 @@ pub fn times_ten(power: i32) -> String {
 
 /// Digits as superscripts.
 pub fn raised(text: &str) -> String {
-    let one = |c: char| match c {
-        '-' => '⁻',
-        '1' => '¹',
-        '2' => '²',
-        '3' => '³',
-        c => c
-            .to_digit(10)
-            .and_then(|d| char::from_u32('⁰' as u32 + d))
-            .unwrap_or(c),
+    let one = |c: char| match c.to_digit(10) {
+        Some(digit) => "⁰¹²³⁴⁵⁶⁷⁸⁹".chars().nth(digit as usize).unwrap_or(c),
+        None if c == '-' => '⁻',
+        None => c,
     };
     text.chars().map(one).collect()
 }
@@ -315,11 +269,8 @@ pub fn ticks(range: &Range<f64>, about: usize) -> Vec<(f64, String)> {
     let width = range.end - range.start;
     let rough = width / about as f64;
     let decade = 10f64.powf(rough.log10().floor());
-    let step = [1.0, 2.0, 5.0, 10.0]
-        .map(|m| m * decade)
-        .into_iter()
-        .find(|s| *s >= 0.999 * rough)
-        .unwrap_or(10.0 * decade);
+    let mut steps = [1.0, 2.0, 5.0].map(|m| m * decade).into_iter();
+    let step = steps.find(|s| *s >= 0.999 * rough).unwrap_or(10.0 * decade);
     let from = (range.start / step).ceil() as i64;
     let to = (range.end / step).floor() as i64;
     let decimals = (-step.log10()).ceil().clamp(0.0, 9.0) as usize;
@@ -341,11 +292,10 @@ mod tests {
 
     #[test]
     fn ticks_are_round_and_inside() {
-        let labels: Vec<String> = ticks(&(-0.031..0.047), 5)
+        let labels = ticks(&(-0.031..0.047), 5)
             .into_iter()
-            .map(|(_, label)| label)
-            .collect();
-        assert_eq!(labels, ["−0.02", "0.00", "0.02", "0.04"]);
+            .map(|(_, label)| label);
+        assert!(labels.eq(["−0.02", "0.00", "0.02", "0.04"]));
         assert_eq!(power_of_ten(&(-3.1e-5..2e-5)), -6);
         assert_eq!(times_ten(-6), "10⁻⁶ ");
     }

@@ -1,7 +1,6 @@
-//! A fit over temperature as text.
+//! A fit over temperature, and the comparison of two.
 
-use std::fmt::Write as _;
-
+use maud::{Markup, html};
 use mimu::parameter::ParameterKind;
 use mimu::quantity::{Sensor, plural, significant};
 use mimu::readable;
@@ -9,110 +8,114 @@ use mimu_thermal::compare::{Comparison, Difference};
 use mimu_thermal::fit::FitVerdict;
 use mimu_thermal::result::{CurveResult, SensorResult, ThermalResult};
 
+use super::page::{Level, Made, judged, page, spoken, warnings};
+use super::table::{between, interval, known, number, table, with_unit};
+use super::terminal::text;
+use super::thermal_plot;
 use crate::hint;
-use crate::report::table::{Cell, Table};
-use crate::report::text::{warn, warn_within, wrap};
 
-/// Number of temperatures at which curves are shown.
-pub(super) const SHOWN: usize = 5;
-
-/// Description of the verdict `one-way`.
-pub(super) const VERDICT_ONE_WAY: &str = "the temperature goes one way only: lag and slope cannot be distinguished, and the intervals allow for any lag. A whole cycle of heating and cooling distinguishes them.";
-
-/// Description of the verdict `misfit`.
-pub(super) const VERDICT_MISFIT: &str = "the remaining errors far exceed the noise: something that these curves and the lag do not contain changes the readings, and the intervals do not include it.";
-
-/// Number of temperatures per line in a table of 100 columns.
-const ACROSS: usize = 3;
+/// Number of temperatures at which curves are shown, and in a summary.
+const SHOWN: [usize; 2] = [5, 3];
 
 /// Result of `mimu thermal fit`: a summary, or with `verbose` everything.
 pub fn thermal_text(result: &ThermalResult, verbose: bool) -> String {
-    match verbose {
-        true => everything(result),
-        false => summary(result),
-    }
+    text(&document(result, Level::of(verbose), None))
 }
 
-fn recorded(result: &ThermalResult) -> String {
-    let [from, to] = result.range_c;
-    format!(
-        "{}: {}, dies at {from:.1} to {to:.1} °C, estimator {}",
+/// The page of a fit.
+pub fn thermal_page(result: &ThermalResult, made: &Made) -> String {
+    let title = format!(
+        "{} over temperature: {}",
         result.device,
-        plural(result.recordings.len() as u64, "recording"),
-        result.estimator,
-    )
+        result.verdict.name()
+    );
+    page(&title, &document(result, Level::Page, Some(made)))
 }
 
-fn summary(result: &ThermalResult) -> String {
-    let mut out = recorded(result) + "\n";
-    let meaning = match result.verdict {
-        // The judgement says it with the figures.
-        FitVerdict::Fitted => None,
-        FitVerdict::OneWay => Some(VERDICT_ONE_WAY),
-        FitVerdict::Misfit => Some(VERDICT_MISFIT),
+pub(super) fn document(result: &ThermalResult, level: Level, made: Option<&Made>) -> Markup {
+    let [from, to] = result.range_c;
+    let class = if result.verdict == FitVerdict::Fitted {
+        "verdict explained"
+    } else {
+        "verdict unexplained"
     };
-    if let Some(meaning) = meaning {
-        let _ = writeln!(out, "verdict: {}: {meaning}", result.verdict.name());
-    }
-    let _ = writeln!(out, "judgement: {}\n", result.judgement);
-    out += &errors(result).text("");
-    for why in without_lag(result) {
-        wrap(&mut out, "lag: ", why);
-    }
-    for (name, sensor) in result.sensors.present() {
-        if let Some(what) = sensor.inseparable {
-            wrap(&mut out, &format!("{name}, inseparable: "), what);
+    let meaning = match result.verdict {
+        FitVerdict::Fitted => {
+            "heating and cooling, or plateaus, distinguish the lag of the dies from the slopes of the curves"
         }
+        FitVerdict::OneWay => {
+            "the temperature goes one way only: lag and slope cannot be distinguished, and the intervals allow for any lag. A whole cycle of heating and cooling distinguishes them."
+        }
+        FitVerdict::Misfit => {
+            "the remaining errors far exceed the noise: something that these curves and the lag do not contain changes the readings, and the intervals do not include it."
+        }
+    };
+    let said: Vec<String> = result.warnings.iter().map(hint::of_thermal).collect();
+    html! {
+        @if level.is_page() { h1 { (result.device) " over temperature" } }
+        p {
+            (result.device) ": " (plural(result.recordings.len() as u64, "recording")) (format!(", dies at {from:.1} to {to:.1} °C, estimator "))
+            (result.estimator)
+        }
+        // The judgement of a fit says it with the figures.
+        @if level.has_all() || result.verdict != FitVerdict::Fitted {
+            ul class="lines" data-head="verdict: " { li class=(class) { strong { (result.verdict.name()) } ": " (meaning) } }
+        }
+        (judged(&result.judgement, "line"))
+        @if let Some(made) = made { dl {
+            @for recording in &result.recordings { dt { "Recording" } dd { code { (recording.samples) } ", SHA-256 " code { (recording.sha256) } } }
+            dt { "Fitted" } dd { (made.created) }
+        } }
+        h2 { "Errors and lag" }
+        (errors(result))
+        @for why in without_lag(result) { p { "lag: " (why) } }
+        @for (name, sensor) in result.sensors.present() {
+            @if let (Some(used), true) = (&sensor.used, level.has_all()) { p { (name) " uses " (used.words()) } }
+            @if let Some(what) = sensor.inseparable { p { (name) ", inseparable: " (what) } }
+        }
+        @if level.is_page() {
+            h2 { "Curves" }
+            figure {
+                div class="figures" { (thermal_plot::panels(result)) }
+                figcaption {
+                    "Change of each parameter from the middle of the range, with its 95 % interval. Below: errors of the dwells, rms while the temperature rises and falls, of each axis over temperature and over time; at a dashed line the next recording begins."
+                }
+            }
+        }
+        @for (name, sensor) in result.sensors.present() {
+            h2 class="sensor" { (spoken(name)) }
+            @if level.has_all() && !sensor.bins.is_empty() { (bins(sensor)) }
+            @if level.has_all() && sensor.hysteresis.is_some() { (hysteresis(sensor)) }
+            (curves(name, result, level))
+        }
+        (warnings(&said, level, 1))
+        @if level == Level::Summary { p.line { "next: --page shows all curves, --verify judges them on another recording; --verbose prints more" } }
+        @if let Some(made) = made { (made.line(result.tool)) }
     }
-    for (name, _) in result.sensors.present() {
-        let _ = writeln!(out);
-        curves_text(&mut out, name, result, false);
-    }
-    // Two more lines follow: the next step, and the file of the calibration.
-    warn_within(&mut out, result.warnings.iter().map(hint::of_thermal), 2);
-    out += "next: --page shows all curves, --verify judges them on another recording; --verbose prints more\n";
-    out
 }
 
 /// Errors and lags of both sensors.
-pub(super) fn errors(result: &ThermalResult) -> Table {
+fn errors(result: &ThermalResult) -> Markup {
     // Held out of a verification recording, because the biases change with every power-on.
-    let without_bias = |s: &SensorResult| s.held_out_rms_without_session_bias;
     let verified = result
         .sensors
         .present()
-        .any(|(_, s)| without_bias(s).is_some());
-    let mut table = Table::new(
-        "Root mean square error of the dwells (of segments of 30 s if only biases are estimated), and the lag of the dies behind the thermometer with its 95 % interval",
-        "rms error",
-    )
-    .numbers(["held out"])
-    .numbers(verified.then_some("minus its bias"))
-    .numbers(["in sample", "noise"])
-    .words("lag of the dies, s");
-    for (name, s) in result.sensors.present() {
-        let unit = readable::error(&s.unit);
-        let known = |v: Option<f64>| Cell::known(v, unit.factor);
-        let lag = match &s.lag_s {
-            Some(lag) => Cell::Between {
-                si: lag.value,
-                ends: [lag.lower, lag.upper],
-            },
-            None => "-".into(),
-        };
-        let first = [
-            format!("{name}, {}", unit.unit).into(),
-            known(s.held_out_rms),
-        ];
-        let without = verified.then(|| known(without_bias(s)));
-        let last = [known(s.rms), known(s.noise_floor), lag];
-        table.row(first.into_iter().chain(without).chain(last));
-    }
-    table
+        .any(|(_, s)| s.held_out_rms_without_session_bias.is_some());
+    let caption = "Root mean square error of the dwells (of segments of 30 s if only biases are estimated), and the lag of the dies behind the thermometer with its 95 % interval";
+    html! { (table(caption, &html! {
+        th { "rms error" } th.n { "held out" } @if verified { th.n { "minus its bias" } } th.n { "in sample" } th.n { "noise" } th.n { "lag of the dies, s" }
+    }, &html! { @for (name, s) in result.sensors.present() {
+        @let unit = readable::error(&s.unit);
+        tr {
+            td { (with_unit(name, &unit)) } (known(s.held_out_rms, unit.factor)) @if verified { (known(s.held_out_rms_without_session_bias, unit.factor)) }
+            (known(s.rms, unit.factor)) (known(s.noise_floor, unit.factor))
+            @match &s.lag_s { Some(lag) => (between(lag.value, [lag.lower, lag.upper], 1.0)), None => (known(None, 1.0)) }
+        }
+    } })) }
 }
 
 /// Why lags are not known, each reason once.
-pub(super) fn without_lag(result: &ThermalResult) -> Vec<&str> {
+fn without_lag(result: &ThermalResult) -> Vec<&str> {
     let mut reasons: Vec<&str> = Vec::new();
     for (_, s) in result.sensors.present() {
         let why = s.lag_reason.as_deref().filter(|_| s.lag_s.is_none());
@@ -121,191 +124,58 @@ pub(super) fn without_lag(result: &ThermalResult) -> Vec<&str> {
     reasons
 }
 
-fn everything(result: &ThermalResult) -> String {
-    let mut out = String::new();
-    let _ = writeln!(out, "{}: {}", recorded(result), result.verdict.name());
-    match result.verdict {
-        FitVerdict::Fitted => {}
-        FitVerdict::OneWay => wrap(&mut out, "", VERDICT_ONE_WAY),
-        FitVerdict::Misfit => wrap(&mut out, "", VERDICT_MISFIT),
-    }
-    let _ = writeln!(out, "judgement: {}", result.judgement);
-    for (name, sensor) in result.sensors.present() {
-        let _ = writeln!(out);
-        sensor_text(&mut out, name, sensor);
-        curves_text(&mut out, name, result, true);
-    }
-    if !result.warnings.is_empty() {
-        let _ = writeln!(out);
-        warn(&mut out, result.warnings.iter().map(hint::of_thermal));
-    }
-    out
-}
-
-fn sensor_text(out: &mut String, name: Sensor, sensor: &SensorResult) {
-    let unit = readable::error(&sensor.unit);
-    let _ = writeln!(out, "{name}");
-    if let Some(used) = &sensor.used {
-        let _ = writeln!(out, "  used: {}", used.words());
-    }
-    match (&sensor.lag_s, &sensor.lag_reason) {
-        (Some(lag), _) => {
-            let _ = writeln!(
-                out,
-                "  lag of the die behind the thermometer: {} s, 95 % from {} to {} s",
-                significant(lag.value),
-                significant(lag.lower),
-                significant(lag.upper)
-            );
-        }
-        (None, reason) => wrap(out, "  lag: ", reason.as_deref().unwrap_or("none")),
-    }
-    if let Some(what) = sensor.inseparable {
-        wrap(out, "  inseparable: ", what);
-    }
-    if let (Some(rms), Some(floor)) = (sensor.rms, sensor.noise_floor) {
-        let _ = write!(out, "  error rms {}", unit.write(rms));
-        if let Some(held_out) = sensor.held_out_rms {
-            let _ = write!(out, ", held out {}", unit.write(held_out));
-        }
-        if let Some(without) = sensor.held_out_rms_without_session_bias {
-            let _ = write!(out, " ({} without its bias)", unit.write(without));
-        }
-        let _ = writeln!(out, ", noise alone {}", unit.write(floor));
-    }
-    if !sensor.bins.is_empty() {
-        *out += &bins(sensor).text("  ");
-    }
-    if sensor.hysteresis.is_some() {
-        *out += &hysteresis(sensor).text("  ");
-    }
-}
-
 /// Difference between heating and cooling by axis.
-pub(super) fn hysteresis(sensor: &SensorResult) -> Table {
+fn hysteresis(sensor: &SensorResult) -> Markup {
     let unit = readable::error(&sensor.unit);
-    let mut table = Table::new(
-        "Hysteresis: difference between heating and cooling that remains after the lag; it is reported, not fitted",
-        format!("hysteresis, {}", unit.unit),
-    )
-    .numbers(["rms", "as K", "largest", "at, °C", "heating - cooling"]);
-    for h in sensor.hysteresis.iter().flatten() {
-        let [mean, largest] = [(h.value, h.half_width), (h.largest, h.largest_half_width)];
-        let interval = |(si, half)| Cell::Interval {
-            si,
-            half,
-            factor: unit.factor,
-        };
-        table.row([
-            Cell::from(h.axis),
-            Cell::number(h.rms, unit.factor),
-            Cell::known(h.kelvin, 1.0),
-            interval(largest),
-            Cell::from(format!("{:.0}", h.largest_at_c)),
-            interval(mean),
-        ]);
-    }
-    table
+    html! { (table("Hysteresis: difference between heating and cooling that remains after the lag; it is reported, not fitted", &html! {
+        th { (with_unit("hysteresis", &unit)) } th.n { "rms" } th.n { "as K" } th.n { "largest" } th.n { "at, °C" } th.n { "heating - cooling" }
+    }, &html! { @for h in sensor.hysteresis.iter().flatten() { tr {
+        td { (h.axis) } (number(h.rms, unit.factor)) (known(h.kelvin, 1.0)) (interval(h.largest, h.largest_half_width, unit.factor))
+        td.n { (format!("{:.0}", h.largest_at_c)) } (interval(h.value, h.half_width, unit.factor))
+    } } })) }
 }
 
 /// Errors by temperature of the die.
-pub(super) fn bins(sensor: &SensorResult) -> Table {
+fn bins(sensor: &SensorResult) -> Markup {
     let unit = readable::error(&sensor.unit);
-    let mut table = Table::new(
-        "Error by temperature of the die, rms; noise: what noise alone would cause",
-        format!("error, {}", unit.unit),
-    )
-    .numbers(["heating", "cooling", "noise", sensor.judged_by]);
-    for b in &sensor.bins {
-        let known = |v: Option<f64>| Cell::known(v, unit.factor);
-        table.row([
-            format!("{:.0} to {:.0} °C", b.from_c, b.to_c).into(),
-            known(b.heating),
-            known(b.cooling),
-            known(Some(b.noise_floor)),
-            Cell::Count(b.dwells as u64),
-        ]);
-    }
-    table
+    html! { (table("Error by temperature of the die, rms; noise: what noise alone would cause", &html! {
+        th { (with_unit("error", &unit)) } th.n { "heating" } th.n { "cooling" } th.n { "noise" } th.n { (sensor.judged_by) }
+    }, &html! { @for b in &sensor.bins { tr {
+        td { (format!("{:.0} to {:.0} °C", b.from_c, b.to_c)) } @for rms in [b.heating, b.cooling, Some(b.noise_floor)] { (known(rms, unit.factor)) } td.n { (b.dwells) }
+    } } })) }
 }
 
-/// Whether a curve is a physical parameter of `sensor`; elements of C and o are not.
-pub(super) fn physical(curve: &CurveResult, sensor: Sensor) -> bool {
-    curve.sensor == sensor && curve.of.0 != ParameterKind::Inverse
-}
-
-/// Physical parameters of a sensor at some temperatures. Unless `verbose`, only scale factors and biases at three. JSON contains more temperatures
-/// and the inverse model.
-fn curves_text(out: &mut String, name: Sensor, result: &ThermalResult, verbose: bool) {
-    let count = if verbose { SHOWN } else { ACROSS };
-    for from in (0..count).step_by(ACROSS) {
-        let shown = from..count.min(from + ACROSS);
-        if let Some(table) = curves(name, result, (shown, count), verbose) {
-            *out += &table.text(if verbose { "  " } else { "" });
-        }
-    }
-}
-
-/// Parameters of a sensor with their intervals, at those of `count` temperatures that are `shown`. `all`: not only scale factors and biases.
-pub(super) fn curves(
-    name: Sensor,
-    result: &ThermalResult,
-    (shown, count): (std::ops::Range<usize>, usize),
-    all: bool,
-) -> Option<Table> {
-    let main = |c: &&CurveResult| {
-        let kind = c.of.0;
-        let of_axis = [
-            ParameterKind::Scale,
-            ParameterKind::Bias,
-            ParameterKind::BiasAndGravity,
-        ];
-        all || of_axis.contains(&kind)
+/// Physical parameters of a sensor with their intervals at some temperatures. A summary has only scale factors and biases, at three. JSON contains more
+/// temperatures and the inverse model.
+fn curves(name: Sensor, result: &ThermalResult, level: Level) -> Markup {
+    let count = SHOWN[usize::from(!level.has_all())];
+    let main = [
+        ParameterKind::Scale,
+        ParameterKind::Bias,
+        ParameterKind::BiasAndGravity,
+    ];
+    let shown = |c: &&CurveResult| {
+        c.sensor == name
+            && c.of.0 != ParameterKind::Inverse
+            && (level.has_all() || main.contains(&c.of.0))
     };
-    let own = result.curves.iter().filter(|c| physical(c, name));
-    let curves: Vec<&CurveResult> = own.filter(main).collect();
-    let temp_c = &curves.first()?.temp_c;
-    let at = shown.map(|k| k * (temp_c.len() - 1) / (count - 1));
-    let at: Vec<usize> = at.collect();
-    let mut table = Table::new(
-        "Parameters with 95 % intervals, by temperature of the die",
-        format!("{name}, ± of 95 %"),
-    )
-    .numbers(at.iter().map(|k| format!("{:.1} °C", temp_c[*k])));
-    for curve in curves {
-        let unit = readable::parameter(&curve.unit);
-        let first = Cell::from(format!("  {}, {}", curve.of, unit.unit));
-        let cells = at.iter().map(|&k| Cell::Interval {
-            si: curve.value[k],
-            half: 0.5 * (curve.upper[k] - curve.lower[k]),
-            factor: unit.factor,
-        });
-        table.row(std::iter::once(first).chain(cells));
-    }
-    Some(table)
-}
-
-/// Rows of a comparison. A summary contains scale factors, biases, and the elements of C and o that differ most in sigmas.
-fn compared(result: &Comparison, verbose: bool) -> Vec<&Difference> {
-    let inverse = |c: &Difference| c.name.contains("_C_") || c.name.contains("_o_");
-    let most = |sensor: &str| {
-        let own = result.curves.iter().filter(|c| c.name.starts_with(sensor));
-        own.filter(|c| inverse(c) && c.sigmas.is_some())
-            .max_by(|a, b| a.sigmas.unwrap_or(0.0).total_cmp(&b.sigmas.unwrap_or(0.0)))
-            .map(|c| c.name.clone())
+    let curves: Vec<&CurveResult> = result.curves.iter().filter(shown).collect();
+    let Some(first) = curves.first() else {
+        return html! {};
     };
-    let most = Sensor::BOTH.map(|sensor| most(sensor.name()));
-    let shown = |c: &&Difference| {
-        verbose || !inverse(c) || most.iter().flatten().any(|name| *name == c.name)
-    };
-    result.curves.iter().filter(shown).collect()
+    let at = |k: usize| k * (first.temp_c.len() - 1) / (count - 1);
+    html! { (table("Parameters with 95 % intervals, by temperature of the die", &html! {
+        th { (name) ", ± of 95 %" } @for k in (0..count).map(at) { th.n { (format!("{:.1} °C", first.temp_c[k])) } }
+    }, &html! { @for curve in curves {
+        @let unit = readable::parameter(&curve.unit);
+        tr { td { "  " (with_unit(curve.of, &unit)) } @for k in (0..count).map(at) { (interval(curve.value[k], 0.5 * (curve.upper[k] - curve.lower[k]), unit.factor)) } }
+    } })) }
 }
 
 /// Result of `mimu thermal compare`: a summary, or with `verbose` everything.
 pub fn thermal_comparison_text(result: &Comparison, verbose: bool) -> String {
-    let mut out = String::new();
     let [from, to] = result.range_c;
-    let lag = |k: usize| match result.lags_s[k] {
+    let [first, second] = result.lags_s.map(|lags| match lags {
         None => "none".into(),
         Some([both, same]) if both == same => format!("{} s", significant(both)),
         Some([gyro, accel]) => format!(
@@ -313,40 +183,20 @@ pub fn thermal_comparison_text(result: &Comparison, verbose: bool) -> String {
             significant(gyro),
             significant(accel)
         ),
-    };
-    let lags = format!(
-        "dies at {from:.1} to {to:.1} °C; lags {} and {}",
-        lag(0),
-        lag(1)
-    );
-    wrap(&mut out, "second minus first, ", &lags);
-    let _ = writeln!(
-        out,
-        "{:<16}{:>12}{:>14}{:>12}{:>10}  unit",
-        "", "rms", "largest", "at °C", "sigmas"
-    );
-    let shown = compared(result, verbose);
-    for c in &shown {
-        let sigmas = c.sigmas.map_or("-".into(), significant);
-        let _ = writeln!(
-            out,
-            "{:<16}{:>12}{:>14}{:>12}{sigmas:>10}  {}",
-            c.name,
-            significant(c.rms),
-            significant(c.largest[0]),
-            format!("{:.1}", c.largest[1]),
-            c.unit
-        );
-    }
-    if verbose {
-        warn(&mut out, result.warnings.iter());
-        return out;
-    }
-    let warnings = result.warnings.iter().map(ToString::to_string);
-    warn_within(&mut out, warnings, 1);
-    let more = (result.curves.len() - shown.len()) as u64;
-    if more > 0 {
-        let _ = writeln!(out, "next: --verbose prints {more} more numbers of C and o");
-    }
-    out
+    });
+    // A summary has scale factors and biases.
+    let inverse = |c: &Difference| c.name.contains("_C_") || c.name.contains("_o_");
+    let shown = result.curves.iter().filter(|c| verbose || !inverse(c));
+    let shown: Vec<&Difference> = shown.collect();
+    let said: Vec<String> = result.warnings.iter().map(ToString::to_string).collect();
+    text(&html! {
+        p { "second minus first, " (format!("dies at {from:.1} to {to:.1} °C; lags {first} and {second}")) }
+        (table("Second calibration minus the first", &html! { th {} th.n { "rms" } th.n { "largest" } th.n { "at °C" } th.n { "sigmas" } th { "unit" } }, &html! {
+            @for c in &shown { tr {
+                td { (c.name) } (number(c.rms, 1.0)) (number(c.largest[0], 1.0)) td.n { (format!("{:.1}", c.largest[1])) } (known(c.sigmas, 1.0)) td { (c.unit) }
+            } }
+        }))
+        (warnings(&said, Level::of(verbose), 0))
+        @if shown.len() < result.curves.len() { p.line { "next: --verbose prints " (result.curves.len() - shown.len()) " more numbers of C and o" } }
+    })
 }

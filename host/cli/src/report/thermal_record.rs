@@ -1,11 +1,11 @@
-//! Progress and result of a procedure over temperature, as text.
+//! Progress and result of a procedure over temperature.
 
-use std::fmt::Write as _;
-
+use maud::html;
 use mimu::quantity::duration;
 use mimu_equipment::carry_out::{CarriedOut, Progress};
 
 use super::record_text;
+use super::terminal::text;
 
 /// Progress in one line.
 pub fn thermal_progress(at: &Progress, has_chamber: bool) -> String {
@@ -21,42 +21,25 @@ pub fn thermal_progress(at: &Progress, has_chamber: bool) -> String {
     if at.since_s.is_none() {
         return format!("on the way to the first temperature and pose: {measured}");
     }
-    let lost = match at.line_lost {
-        true => "; the port has vanished: waiting for it",
-        false => "",
+    let lost = if at.line_lost {
+        "; the port has vanished: waiting for it"
+    } else {
+        ""
     };
-    let [round, rounds] = at.round;
-    let [done, planned] = at.dwells;
+    let ([round, rounds], [done, planned], left) = (at.round, at.dwells, duration(at.left_s));
     format!(
-        "round {round} of {rounds}, {done} of {planned} dwells and turns: {measured}, {} left{lost}",
-        duration(at.left_s)
+        "round {round} of {rounds}, {done} of {planned} dwells and turns: {measured}, {left} left{lost}"
     )
 }
 
 /// Completed dwells, chamber settings, and the recording.
 pub fn thermal_record_text(made: &CarriedOut) -> String {
-    let mut out = record_text(&made.recorded);
-    let _ = writeln!(
-        out,
-        "procedure: {} of {} rounds, {} of {} dwells and turns",
-        made.rounds_done, made.rounds_planned, made.dwells_done, made.dwells_planned
-    );
     let dropped = made.recorded.state.dropped.len();
-    if dropped > 0 {
-        let _ = writeln!(
-            out,
-            "not used: {dropped}, because they were not recorded as planned"
-        );
-    }
-    if let Some(rest_c) = made.rest_c {
-        let _ = writeln!(
-            out,
-            "chamber: {} set points; set to {rest_c} °C at the end",
-            made.set_points
-        );
-    }
-    for error in &made.not_at_rest {
-        let _ = writeln!(out, "NOT AT REST: {error}");
-    }
-    out
+    record_text(&made.recorded)
+        + &text(&html! {
+            p { "procedure: " (made.rounds_done) " of " (made.rounds_planned) " rounds, " (made.dwells_done) " of " (made.dwells_planned) " dwells and turns" }
+            @if dropped > 0 { p { "not used: " (dropped) ", because they were not recorded as planned" } }
+            @if let Some(rest_c) = made.rest_c { p { "chamber: " (made.set_points) " set points; set to " (rest_c) " °C at the end" } }
+            ul class="lines" data-head="NOT AT REST: " { @for error in &made.not_at_rest { li { (error) } } }
+        })
 }

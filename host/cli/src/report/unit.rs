@@ -15,10 +15,8 @@ use mimu::prepared::Prepared;
 use mimu::result::diagnosis::DiagnosisResult;
 use mimu_recording::error::Result;
 
-use super::data_sheet;
-use super::diagnosis::Sections;
-use super::page::{Made, judged, page};
-use super::verify;
+use super::page::{Level, Made, contents, judged, page};
+use super::{data_sheet, diagnosis, verify};
 
 /// Contents of the page.
 pub struct UnitReport<'a> {
@@ -47,57 +45,56 @@ pub struct UnitReport<'a> {
 /// # Errors
 /// A model of the diagnosis is singular, so that nothing can be drawn.
 pub fn unit_page(unit: &UnitReport, made: &Made) -> Result<String> {
-    let found = unit.diagnosis.map(|d| Sections::new(d, made)).transpose()?;
-    let found = found.as_ref();
-    let calibration = unit.calibration;
+    unit.diagnosis
+        .map(|d| diagnosis::drawable(d, made))
+        .transpose()?;
+    let (calibration, found) = (unit.calibration, unit.diagnosis);
     let main = html! {
         h1 { "Inertial unit " (calibration.device) }
         @match (found, &calibration.judgement) {
-            (Some(found), _) => (found.verdict()),
-            (None, Some(judgement)) => (judged(judgement)),
+            (Some(found), _) => (diagnosis::first(found, Level::Page)),
+            (None, Some(judgement)) => (judged(judgement, "")),
             (None, None) => {}
         }
         (identity(unit, made))
-        (contents(unit))
-        @if let Some(noise) = unit.noise {
-            h2 id="noise" { "Noise at rest" }
-            (noise::section(noise))
-        }
+        (contents(&[
+            ("noise", "Noise at rest", unit.noise.is_some()),
+            ("errors", "Error before and after", found.is_some() || !unit.verified.is_empty()),
+            ("temperature", "Over temperature", calibration.temperature.is_some()),
+            ("calibration", "Calibration", true),
+            ("data-sheet", "Against the data sheet", unit.data_sheet.is_some()),
+            ("effects", "Effects and residuals", found.is_some()),
+            ("recordings", "Recordings", found.is_some()),
+        ]))
+        @if let Some(noise) = unit.noise { h2 id="noise" { "Noise at rest" } (noise::section(noise)) }
         @if found.is_some() || !unit.verified.is_empty() || !unit.not_judged.is_empty() {
             h2 id="errors" { "Error before and after" }
-            @if let Some(found) = found { (found.errors()) }
-            @if !unit.verified.is_empty() { (verify::errors(unit.verified, true).html()) }
-            @if !unit.whole_turns.is_empty() { (verify::whole_turns_table(unit.whole_turns).html()) }
+            @if let Some(found) = found { (diagnosis::errors(found, Level::Page)) }
+            @if !unit.verified.is_empty() { (verify::errors(unit.verified)) }
+            @if !unit.whole_turns.is_empty() { (verify::whole_turns_table(unit.whole_turns)) }
             @for why in unit.not_judged { p { "Not judged: " (why) "." } }
-            @if let Some(found) = found { (found.leftover()) }
         }
-        @if calibration.temperature.is_some() {
-            h2 id="temperature" { "Over temperature" }
-            (curves::section(calibration))
-        }
+        @if calibration.temperature.is_some() { h2 id="temperature" { "Over temperature" } (curves::section(calibration)) }
         h2 id="calibration" { "Calibration" }
         @if let Some(file) = unit.calibration_file { p { "From " code { (file) } "." } }
         (model::section(calibration))
-        @if let Some(sheet) = unit.data_sheet {
-            h2 id="data-sheet" { "Against the data sheet" }
-            (data_sheet::section(sheet))
-        }
+        @if let Some(sheet) = unit.data_sheet { h2 id="data-sheet" { "Against the data sheet" } (data_sheet::section(sheet)) }
         @if let Some(found) = found {
             h2 id="effects" { "Effects and residuals" }
-            (found.sensors())
+            (diagnosis::sensors(found, Level::Page))
             h2 id="recordings" { "Recordings" }
             @for (name, prepared) in unit.recordings {
                 h3 { code { (name) } }
-                (poses::figure(prepared, calibration, found.accel()))
+                (poses::figure(prepared, calibration, found.sensors.accel.as_ref().and_then(|s| s.picture.as_ref())))
                 (trace::figure(prepared))
             }
-            (found.recorded())
-            (found.tried())
-            (found.method())
+            (diagnosis::recorded(found))
+            (diagnosis::tried(found, Level::Page, true))
+            (diagnosis::method())
         }
-        p class="dim" { "mimu " (env!("CARGO_PKG_VERSION")) ", " (made.created) ": " code { (made.command) } }
+        (made.line(concat!("mimu ", env!("CARGO_PKG_VERSION"))))
     };
-    let verdict = unit.diagnosis.map_or("calibration", |d| d.verdict.name());
+    let verdict = found.map_or("calibration", |d| d.verdict.name());
     Ok(page(&format!("{}: {verdict}", calibration.device), &main))
 }
 
@@ -108,32 +105,12 @@ pub fn trace_figure(prepared: &Prepared) -> String {
 
 fn identity(unit: &UnitReport, made: &Made) -> Markup {
     let calibration = unit.calibration;
-    html! {
-        dl {
-            dt { "Unit" } dd { (calibration.device) @if let Some(id) = &calibration.unit_id { ", number " code { (id) } } }
-            dt { "Reported" } dd { (made.created) }
-            @if let Some(created) = &calibration.created { dt { "Calibrated" } dd { (created) } }
-            @if let Some(judgement) = &calibration.judgement { dt { "Judgement" } dd { (judgement) } }
-            @for source in unit.diagnosis.iter().flat_map(|d| &d.recordings) {
-                dt { "Recording" } dd { code { (source.place) } ", SHA-256 " code { (source.sha256) } }
-            }
+    html! { dl {
+        dt { "Unit" } dd { (calibration.device) @if let Some(id) = &calibration.unit_id { ", number " code { (id) } } }
+        dt { "Reported" } dd { (made.created) }
+        @if let Some(created) = &calibration.created { dt { "Calibrated" } dd { (created) } }
+        @for source in unit.diagnosis.iter().flat_map(|d| &d.recordings) {
+            dt { "Recording" } dd { code { (source.place) } ", SHA-256 " code { (source.sha256) } }
         }
-    }
-}
-
-fn contents(unit: &UnitReport) -> Markup {
-    let entry = |id: &str, name: &str| html! { li { a href={ "#" (id) } { (name) } } };
-    html! {
-        nav aria-label="Contents" { ul class="contents" {
-            @if unit.noise.is_some() { (entry("noise", "Noise at rest")) }
-            @if unit.diagnosis.is_some() || !unit.verified.is_empty() { (entry("errors", "Error before and after")) }
-            @if unit.calibration.temperature.is_some() { (entry("temperature", "Over temperature")) }
-            (entry("calibration", "Calibration"))
-            @if unit.data_sheet.is_some() { (entry("data-sheet", "Against the data sheet")) }
-            @if unit.diagnosis.is_some() {
-                (entry("effects", "Effects and residuals"))
-                (entry("recordings", "Recordings"))
-            }
-        } }
-    }
+    } }
 }

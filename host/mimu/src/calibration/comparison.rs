@@ -187,6 +187,17 @@ impl ComparedParameter {
     }
 }
 
+impl ComparedParameter {
+    /// Of two files, the second value minus the first, and the half-width of its 95 % interval if it is known. `None` for more files.
+    pub fn difference(&self) -> Option<(f64, Option<f64>)> {
+        let &[first, second] = self.values.as_slice() else {
+            return None;
+        };
+        let half = self.sigmas.as_ref().map(|s| 1.96 * s[0].hypot(s[1]));
+        Some((second - first, half))
+    }
+}
+
 fn mark_changes(parameters: &mut [ComparedParameter]) {
     let judged = parameters.iter().enumerate();
     let mut judged: Vec<(usize, f64)> = judged.filter_map(|(k, c)| Some((k, c.p?))).collect();

@@ -1,12 +1,11 @@
 //! As found and as left.
 
 use maud::{Markup, html};
-use mimu::certificate::{AsFound, AsFoundRow};
-use mimu::quantity::{plus_minus, significant};
+use mimu::certificate::AsFound;
 use mimu::readable;
 
 use crate::report::page::{spoken, written};
-use crate::report::table::{Cell, Table};
+use crate::report::table::{interval, number, rounded, table};
 
 /// The calibration that the unit had beside the new one.
 pub(super) fn section(as_found: Option<&AsFound>) -> Markup {
@@ -26,71 +25,37 @@ pub(super) fn section(as_found: Option<&AsFound>) -> Markup {
             "in size, the uncertainties do not explain the change. Errors of a reference that both calibrations used make En smaller than it would be by chance alone."
         }
         p { strong { (beyond) " of " (found.rows.len()) } " parameters changed by more than the uncertainties explain." }
-        (parameters(found).html())
-        @if !found.errors.is_empty() { (errors(found).html()) }
+        (parameters(found))
+        @if !found.errors.is_empty() { (errors(found)) }
         @if let Some(why) = &found.not_applied { p { "The calibration as found was not applied to the recording: " (why) "." } }
         @for note in &found.notes { p { (note) "." } }
     }
 }
 
-fn parameters(found: &AsFound) -> Table {
-    let mut table = Table::new("Parameters as found and as left, with U", "parameter")
-        .numbers(["as found", "as left", "change", "En"])
-        .words("unit")
-        .words("within U");
-    for row in &found.rows {
-        let shown = readable::parameter(&row.unit);
-        let of = |k: usize, si: f64| match row.expanded {
-            Some(both) => Cell::Words(written(&plus_minus(
-                si * shown.factor,
-                both[k] * shown.factor,
-            ))),
-            None => Cell::number(si, shown.factor),
-        };
-        table.row([
-            format!("{} {}", row.sensor, row.name).into(),
-            of(0, row.found),
-            of(1, row.left),
-            Cell::Words(written(&change(row, shown.factor))),
-            Cell::Words(
-                row.normalised_error()
-                    .map_or("–".into(), |e| written(&format!("{e:.2}"))),
-            ),
-            shown.unit.to_string().into(),
-            Cell::from(match row.is_within() {
-                Some(true) => "yes",
-                Some(false) => "no",
-                None => "not known",
-            }),
-        ]);
-    }
-    table
+fn parameters(found: &AsFound) -> Markup {
+    html! { (table("Parameters as found and as left, with U", &html! {
+        th { "parameter" } th.n { "as found" } th.n { "as left" } th.n { "change" } th.n { "En" } th { "unit" } th { "within U" }
+    }, &html! { @for row in &found.rows {
+        @let unit = readable::parameter(&row.unit);
+        @let factor = unit.factor;
+        tr {
+            td { (row.sensor) " " (row.name) }
+            // The change has as many decimals as its uncertainty.
+            @match row.expanded {
+                Some([a, b]) => { (interval(row.found, a, factor)) (interval(row.left, b, factor)) (rounded(row.change(), a.hypot(b), factor)) }
+                None => { @for value in [row.found, row.left, row.change()] { (number(value, factor)) } }
+            }
+            td.n { @if let Some(e) = row.normalised_error() { (written(&format!("{e:.2}"))) } @else { "–" } }
+            td { (unit.unit) } td { @match row.is_within() { Some(true) => "yes", Some(false) => "no", None => "not known" } }
+        }
+    } })) }
 }
 
-/// The change with as many decimals as its uncertainty has.
-fn change(row: &AsFoundRow, factor: f64) -> String {
-    let Some([found, left]) = row.expanded else {
-        return significant(row.change() * factor);
-    };
-    let both = plus_minus(row.change() * factor, found.hypot(left) * factor);
-    both.split(" ± ").next().unwrap_or_default().to_owned()
-}
-
-fn errors(found: &AsFound) -> Table {
-    let mut table = Table::new(
-        "Root mean square errors in the recording of this certificate",
-        "error",
-    )
-    .numbers(["as found", "as left"])
-    .words("unit");
-    for error in &found.errors {
-        let shown = readable::error(error.unit);
-        table.row([
-            format!("{}: {}", spoken(error.sensor), error.figure).into(),
-            Cell::number(error.found, shown.factor),
-            Cell::number(error.left, shown.factor),
-            shown.unit.to_string().into(),
-        ]);
-    }
-    table
+fn errors(found: &AsFound) -> Markup {
+    html! { (table("Root mean square errors in the recording of this certificate", &html! { th { "error" } th.n { "as found" } th.n { "as left" } th { "unit" } }, &html! {
+        @for error in &found.errors {
+            @let unit = readable::error(error.unit);
+            tr { td { (spoken(error.sensor)) ": " (error.figure) } (number(error.found, unit.factor)) (number(error.left, unit.factor)) td { (unit.unit) } }
+        }
+    })) }
 }

@@ -1,12 +1,13 @@
 //! Results of a certificate with expanded uncertainties, and what these consist of.
 
 use maud::{Markup, html};
-use mimu::certificate::{Certificate, ResultRow, SensorResults};
-use mimu::quantity::{Sensor, plus_minus, significant};
+use mimu::certificate::{Certificate, SensorResults};
+use mimu::quantity::{Sensor, plus_minus};
 use mimu::readable;
 
 use crate::report::budget;
-use crate::report::page::{spoken, written};
+use crate::report::page::spoken;
+use crate::report::table::{number, table, typed};
 use crate::report::unit::model;
 
 /// From so many degrees of freedom on, they are written as infinite: the coverage factor is 1.96 to its last digit.
@@ -20,74 +21,45 @@ pub(super) fn section(certificate: &Certificate) -> Markup {
             "with the effective degrees of freedom ν of the parameter; with ν = ∞, the normal distribution, it is 1.96."
         }
         @for (sensor, of) in certificate.sensors.present() {
+            @let shown = readable::error(of.unit);
             h3 class="sensor" { (spoken(sensor)) }
             (parameters(sensor, of))
-            (errors(of))
+            p {
+                "Root mean square of the " (of.figure) ": " (shown.write(of.rms)) " in the dwells of the fit"
+                @if let Some(rms) = of.held_out_rms { ", " (shown.write(rms)) " in dwells that the fit had not used" }
+                "."
+            }
             (model::matrix(sensor, &of.table, &[]))
         }
     }
 }
 
 fn parameters(sensor: Sensor, of: &SensorResults) -> Markup {
-    html! {
-        div class="scroll" { table {
-            caption { "Parameters of the " (spoken(sensor)) "; " (of.table.frame) }
-            thead { tr { th { "parameter" } th class="n" { "value" } th class="n" { "U" } th { "unit" } th class="n" { "k" } th class="n" { "ν" } } }
-            tbody { @for row in &of.parameters { (parameter(row)) } }
-        } }
-    }
-}
-
-fn parameter(row: &ResultRow) -> Markup {
-    let shown = readable::parameter(&row.unit);
-    let both = plus_minus(row.value * shown.factor, row.expanded * shown.factor);
-    let (value, half) = both.split_once(" ± ").unwrap_or((&both, ""));
-    html! {
+    let caption = format!("Parameters of the {}; {}", spoken(sensor), of.table.frame);
+    html! { (table(&caption, &html! { th { "parameter" } th.n { "value" } th.n { "U" } th { "unit" } th.n { "k" } th.n { "ν" } }, &html! { @for row in &of.parameters {
+        @let unit = readable::parameter(&row.unit);
+        @let both = plus_minus(row.value * unit.factor, row.expanded * unit.factor);
         tr {
             td { (row.of.0.words()) " " (row.of.axis()) }
-            @match row.coverage_factor() {
-                Some(k) => {
-                    td class="n" { data value=(row.value) { (written(value)) } }
-                    td class="n" { data value=(row.expanded) { (half) } }
-                    td { (shown.unit) }
-                    td class="n" { (format!("{k:.2}")) }
-                    td class="n" { @if row.dof < MANY { (format!("{:.0}", row.dof.floor())) } @else { "∞" } }
-                }
-                None => {
-                    td class="n" { data value=(row.value) { (written(&significant(row.value * shown.factor))) } }
-                    td class="n dim" { "defines the frame" }
-                    td { (shown.unit) } td {} td {}
-                }
-            }
+            @if let (Some(k), Some((value, uncertainty))) = (row.coverage_factor(), both.split_once(" ± ")) {
+                (typed(row.value, value)) (typed(row.expanded, uncertainty)) td { (unit.unit) }
+                td.n { (format!("{k:.2}")) } td.n { @if row.dof < MANY { (format!("{:.0}", row.dof.floor())) } @else { "∞" } }
+            } @else { (number(row.value, unit.factor)) td.n.dim { "defines the frame" } td { (unit.unit) } td {} td {} }
         }
-    }
-}
-
-fn errors(of: &SensorResults) -> Markup {
-    let shown = readable::error(of.unit);
-    html! {
-        p {
-            "Root mean square of the " (of.figure) ": " (shown.write(of.rms)) " in the dwells of the fit"
-            @if let Some(rms) = of.held_out_rms { ", " (shown.write(rms)) " in dwells that the fit had not used" }
-            "."
-        }
-    }
+    } })) }
 }
 
 /// What the variances consist of.
 pub(super) fn budget(certificate: &Certificate) -> Markup {
-    let stated = certificate
+    let tables = certificate
         .sensors
         .present()
-        .any(|(_, of)| !of.budget.is_empty());
+        .filter_map(|(sensor, of)| budget::shares(sensor, &of.budget));
+    let tables: Vec<Markup> = tables.collect();
     html! {
-        @if stated {
+        @if tables.is_empty() { p { "Noise and scatter make up the whole variance of each parameter." } } @else {
             p { "Shares of the influences in the variance of each parameter. noise includes scatter between dwells beyond noise, where there is any." }
-            @for (sensor, of) in certificate.sensors.present() {
-                @if let Some(table) = budget::table(sensor, &of.budget) { (table.html()) }
-            }
-        } @else {
-            p { "Noise and scatter make up the whole variance of each parameter." }
+            @for table in &tables { (table) }
         }
     }
 }

@@ -1,13 +1,14 @@
-//! What a prior adds to a design, as text.
+//! What a prior adds to a design.
 
-use std::fmt::Write as _;
-
-use super::wrapped;
+use maud::{Markup, html};
 use mimu::plan::design::fewest::MOST;
 use mimu::quantity::{plural, significant};
-use mimu::readable::{self, Readable};
+use mimu::readable;
 use mimu::result::design::Design;
-use mimu::result::design::beside_population::{BesidePopulation, ByDwells, HalfWidths};
+use mimu::result::design::beside_population::{BesidePopulation, HalfWidths};
+
+use crate::report::page::Level;
+use crate::report::table::{number, table};
 
 /// Numbers of dwells in a summary.
 const SHOWN: [usize; 5] = [0, 3, 6, 9, 12];
@@ -47,85 +48,47 @@ pub(super) fn alone(half: f64) -> String {
     }
 }
 
-/// Half-widths in the units of data sheets: biases, scale factors, angles.
-fn cells(widths: &HalfWidths) -> [String; 3] {
-    let Readable { factor, .. } = readable::parameter("m/s^2");
-    let values = [
-        widths.bias_mps2 * factor,
-        widths.scale * 1e6,
-        widths.angle_rad * 1e6,
-    ];
-    values.map(|v| match v.is_finite() {
-        true => significant(v),
-        false => "open".into(),
+const NAMES: [&str; 3] = ["bias, mg", "scale, ppm", "angle, µrad"];
+
+/// Half-widths in the units of data sheets, as in [`NAMES`].
+fn cells(widths: &HalfWidths) -> [Markup; 3] {
+    let bias = readable::parameter("m/s^2").factor;
+    [
+        (widths.bias_mps2, bias),
+        (widths.scale, 1e6),
+        (widths.angle_rad, 1e6),
+    ]
+    .map(|(si, factor)| match si.is_finite() {
+        true => number(si, factor),
+        false => html! { td.n { "open" } },
     })
 }
 
-const NAMES: [&str; 3] = ["bias, mg", "scale, ppm", "angle, µrad"];
-
-/// Largest half-widths for a few numbers of dwells, and what is assumed and not designed.
-pub(super) fn few_dwells(out: &mut String, prior: &BesidePopulation) {
-    let shown: Vec<&ByDwells> = prior
-        .by_dwells
-        .iter()
-        .filter(|b| SHOWN.contains(&b.dwells))
-        .collect();
-    let mut row = |name: &str, cell: &dyn Fn(&ByDwells) -> String| {
-        let _ = write!(out, "  {name:<30}");
-        for by in &shown {
-            let _ = write!(out, "{:>10}", cell(by));
-        }
-        out.push('\n');
+/// Largest half-widths by the number of dwells, in a summary for a few; what is assumed, and what is not designed.
+pub(super) fn by_dwells(report: &Design, prior: &BesidePopulation, level: Level) -> Markup {
+    let caption = "Largest half-widths of the best designs";
+    let few = || {
+        prior
+            .by_dwells
+            .iter()
+            .filter(|by| SHOWN.contains(&by.dwells))
     };
-    row("dwells (0: population alone)", &|by| by.dwells.to_string());
-    for (k, name) in NAMES.iter().enumerate() {
-        row(&format!("  largest {name}"), &|by| {
-            cells(&by.with)[k].clone()
-        });
-    }
-    wrapped(out, "poses", &taken(prior));
-    wrapped(out, "gyro", GYRO);
-}
-
-/// How well poses are assumed to be taken.
-fn taken(prior: &BesidePopulation) -> String {
-    format!(
-        "assumed to be taken to within {}° about each level axis, 1 sigma (--aim)",
-        significant(prior.aim_deg)
-    )
-}
-
-const GYRO: &str = "not designed: its inputs are the turns; mimu fit --prior uses its prior too";
-
-/// Largest half-widths for all listed numbers of dwells, with the prior and without, and what is not designed.
-pub(super) fn by_dwells(out: &mut String, report: &Design, prior: &BesidePopulation) {
-    let _ = writeln!(
-        out,
-        "\n  largest half-widths of the best designs of dwells of {} s (0: the population alone)",
-        significant(report.dwell_s)
-    );
-    let _ = writeln!(
-        out,
-        "  {:<8}{:>39}{:>39}",
-        "", "with the prior", "without it"
-    );
-    let _ = write!(out, "  {:<8}", "dwells");
-    for name in NAMES.iter().chain(&NAMES) {
-        let _ = write!(out, "{name:>13}");
-    }
-    out.push('\n');
-    for by in &prior.by_dwells {
-        let _ = write!(out, "  {:<8}", by.dwells);
-        let without = by
-            .without
-            .as_ref()
-            .map_or_else(|| ["-"; 3].map(String::from), cells);
-        for cell in cells(&by.with).iter().chain(&without) {
-            let _ = write!(out, "{cell:>13}");
+    html! {
+        @if level.has_all() {
+            hr;
+            p { "largest half-widths of the best designs of dwells of " (significant(report.dwell_s)) " s (0: the population alone), with the prior and without" }
+            (table(caption, &html! { th { "dwells" } @for name in NAMES { th.n { (name) } } @for name in NAMES { th.n { "without: " (name) } } }, &html! { @for by in &prior.by_dwells { tr {
+                td { (by.dwells) } @for cell in cells(&by.with) { (cell) }
+                @match &by.without { Some(widths) => { @for cell in cells(widths) { (cell) } }, None => { @for _ in NAMES { td.n { "-" } } } }
+            } } }))
+        } @else {
+            (table(caption, &html! { th { "dwells (0: population alone)" } @for by in few() { th.n { (by.dwells) } } }, &html! {
+                @for (k, name) in NAMES.iter().enumerate() { tr { td { "  largest " (name) } @for by in few() { (cells(&by.with)[k]) } } }
+            }))
         }
-        out.push('\n');
+        dl.aligned {
+            dt { "poses" } dd { "assumed to be taken to within " (significant(prior.aim_deg)) "° about each level axis, 1 sigma (--aim)" }
+            dt { "gyro" } dd { "not designed: its inputs are the turns; mimu fit --prior uses its prior too" }
+        }
     }
-    out.push('\n');
-    wrapped(out, "poses", &taken(prior));
-    wrapped(out, "gyro", GYRO);
 }

@@ -3,11 +3,13 @@
 use maud::{Markup, html};
 use mimu::calibration::{Calibration, TriadTable};
 use mimu::parameter::ParameterKind;
-use mimu::quantity::{AXES, Sensor, plus_minus};
-use mimu::readable;
+use mimu::quantity::{AXES, Sensor};
+use mimu::readable::{self, Readable};
 use mimu_recording::RawUnit;
 
-use crate::report::page::{number, spoken, written};
+use crate::report::fit::by_axis;
+use crate::report::page::spoken;
+use crate::report::table::{by_axes, interval, number, table, typed};
 
 /// Tables of both sensors.
 pub fn section(calibration: &Calibration) -> Markup {
@@ -22,105 +24,78 @@ pub fn section(calibration: &Calibration) -> Markup {
     }
 }
 
-fn value(si: f64, half: Option<f64>, factor: f64) -> Markup {
-    html! {
-        data value=(si) {
-            @match half {
-                // Parameters that define the frame are known exactly.
-                Some(0.0) => { (number(si, factor, "")) " (fixed)" }
-                Some(half) => (written(&plus_minus(si * factor, half * factor))),
-                None => (written(&mimu::quantity::significant(si * factor))),
-            }
-        }
-    }
-}
-
-fn physical(table: &TriadTable) -> Markup {
-    let p = &table.physical;
-    let raw = table.raw_unit.to_string();
-    let raw = if table.raw_unit == RawUnit::Si {
-        table.unit.clone()
-    } else {
-        raw
+fn physical(triad: &TriadTable) -> Markup {
+    let p = &triad.physical;
+    let (raw, gain) = match triad.raw_unit {
+        RawUnit::Si => (triad.unit.clone(), readable::parameter("")),
+        raw => (
+            raw.to_string(),
+            readable::parameter(&format!("{raw}/({})", triad.unit)),
+        ),
     };
-    let gain = match table.raw_unit {
-        RawUnit::Si => readable::parameter(""),
-        _ => readable::parameter(&format!("{raw}/({})", table.unit)),
-    };
-    let bias = readable::parameter(&raw);
-    let k = table.interval_sigmas();
     // The page is for those who use the calibration tomorrow.
-    let next = table.next_power_on.as_ref();
-    let half = |sigmas: Option<[f64; 3]>, kind: ParameterKind, i: usize| {
-        let next = next.and_then(|n| n.intervals(kind)).map(|all| all[i]);
-        next.or_else(|| sigmas.map(|s| k * s[i]))
-    };
-    let angles = ["yz", "zy", "zx"];
-    html! {
-        div class="scroll" { table {
-            caption {
-                "Physical parameters with 95 % intervals"
-                @if next.is_some() { " at the next power-on, from several sessions" }
-            }
-            thead { tr { th { "parameter" } @for axis in AXES { th class="n" { (axis) } } } }
-            tbody {
-                tr {
-                    td { "scale factor" @if !gain.unit.is_empty() { ", " (gain.unit) } }
-                    @for i in 0..3 { td class="n" { (value(p.scale_factor[i], half(p.sigma_scale_factor, ParameterKind::Scale, i), gain.factor)) } }
-                }
-                tr {
-                    td { "bias, " (bias.unit) }
-                    @for i in 0..3 { td class="n" { (value(p.bias[i], half(p.sigma_bias, ParameterKind::Bias, i), bias.factor)) } }
-                }
-                tr {
-                    td { "misalignment, deg" }
-                    @for i in 0..3 { td class="n" { (value(p.misalignment_deg[i], half(p.sigma_misalignment_deg, ParameterKind::Misalignment, i), 1.0)) } }
-                }
-                tr {
-                    td { "non-orthogonality " (angles.join(", ")) ", deg" }
-                    @for i in 0..3 { td class="n" { (value(p.non_orthogonality_deg[i], half(p.sigma_non_orthogonality_deg, ParameterKind::NonOrthogonality, i), 1.0)) } }
-                }
-            }
+    let next = triad.next_power_on.as_ref();
+    let caption = format!(
+        "Physical parameters with 95 % intervals{}",
+        if next.is_some() {
+            " at the next power-on, from several sessions"
+        } else {
+            ""
+        }
+    );
+    let row = |kind: ParameterKind, values: [f64; 3], sigmas: Option<[f64; 3]>, unit: Readable| {
+        html! { tr {
+            td { (by_axis(kind, &unit)) }
+            @let half = next.and_then(|n| n.intervals(kind)).or_else(|| sigmas.map(|s| s.map(|s| triad.interval_sigmas() * s)));
+            @for i in 0..3 { @match half { Some(half) => (interval(values[i], half[i], unit.factor)), None => (number(values[i], unit.factor)) } }
         } }
-    }
+    };
+    let degrees = || Readable {
+        factor: 1.0,
+        unit: "deg".into(),
+    };
+    html! { (by_axes(&caption, &html! { "parameter" }, &html! {
+        (row(ParameterKind::Scale, p.scale_factor, p.sigma_scale_factor, gain.clone()))
+        (row(ParameterKind::Bias, p.bias, p.sigma_bias, readable::parameter(&raw)))
+        (row(ParameterKind::Misalignment, p.misalignment_deg, p.sigma_misalignment_deg, degrees()))
+        (row(ParameterKind::NonOrthogonality, p.non_orthogonality_deg, p.sigma_non_orthogonality_deg, degrees()))
+    })) }
 }
 
-/// The digits of single precision, as on a device.
-fn digits(value: f64) -> String {
-    match value == 0.0 {
-        true => "0".into(),
-        false => written(&format!("{value:.7e}")),
-    }
-}
-
-pub(in crate::report) fn matrix(sensor: Sensor, table: &TriadTable, effects: &[String]) -> Markup {
-    let input = match sensor {
-        Sensor::Gyro => "rate",
-        Sensor::Accel => "specific force",
+pub(in crate::report) fn matrix(sensor: Sensor, of: &TriadTable, effects: &[String]) -> Markup {
+    let input = if sensor == Sensor::Gyro {
+        "rate"
+    } else {
+        "specific force"
     };
-    let formula = match effects.is_empty() {
-        true => "C u + o",
-        false => "C (u - S e) + o",
+    let formula = if effects.is_empty() {
+        "C u + o"
+    } else {
+        "C (u - S e) + o"
     };
-    html! {
-        div class="scroll" { table {
-            caption {
-                "To apply it: " (input) " = " (formula) ", with u the reading in " (table.raw_unit.to_string()) "; " (table.direction) ", in " (table.unit)
-                @if !effects.is_empty() {
-                    ". e is the error by " (effects.join(", ")) ", in " (table.unit)
-                    "; S is diagonal, and converts it to readings by the scale factors. C and o are right only with these effects"
-                }
-            }
-            thead { tr { th { "axis" } th class="n" { "C, x" } th class="n" { "C, y" } th class="n" { "C, z" } th class="n" { "o" } } }
-            tbody {
-                @for (i, axis) in AXES.iter().enumerate() {
-                    tr {
-                        td { (axis) }
-                        @for j in 0..3 { td class="n" { data value=(table.C[i][j]) { (digits(table.C[i][j])) } } }
-                        td class="n" { data value=(table.o[i]) { (digits(table.o[i])) } }
-                    }
-                }
-            }
-        } }
+    let mut caption = format!(
+        "To apply it: {input} = {formula}, with u the reading in {}; {}, in {}",
+        of.raw_unit, of.direction, of.unit
+    );
+    if !effects.is_empty() {
+        caption += &format!(
+            ". e is the error by {}, in {}; S is diagonal, and converts it to readings by the scale factors. C and o are right only with these effects",
+            effects.join(", "),
+            of.unit
+        );
     }
+    // The digits of single precision, as on a device.
+    let digits = |value: f64| {
+        typed(
+            value,
+            &if value == 0.0 {
+                "0".into()
+            } else {
+                format!("{value:.7e}")
+            },
+        )
+    };
+    html! { (table(&caption, &html! { th { "axis" } th.n { "C, x" } th.n { "C, y" } th.n { "C, z" } th.n { "o" } }, &html! {
+        @for (i, axis) in AXES.iter().enumerate() { tr { td { (axis) } @for j in 0..3 { (digits(of.C[i][j])) } (digits(of.o[i])) } }
+    })) }
 }

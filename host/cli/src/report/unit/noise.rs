@@ -6,8 +6,9 @@ use mimu::quantity::Sensor;
 use mimu::readable;
 use mimu_allan::model::{FLOOR, Term};
 
-use crate::report::page::{number, spoken};
-use crate::report::svg::{Frame, Panel, decades};
+use crate::report::page::{shown, spoken};
+use crate::report::svg::{Panel, decades};
+use crate::report::table::{between, table};
 
 /// Number of points of a curve.
 const POINTS: usize = 60;
@@ -15,20 +16,18 @@ const CLASSES: [&str; 3] = ["axis-x", "axis-y", "axis-z"];
 
 /// The table and the curves.
 pub fn section(noise: &NoiseFile) -> Markup {
+    let (by, unit) = if noise.duration_s < 7200.0 {
+        (60.0, "min")
+    } else {
+        (3600.0, "h")
+    };
+    let sensors = Sensor::BOTH.map(|sensor| (sensor, noise.of(sensor)));
+    let sensors = || sensors.iter().filter(|(_, channels)| !channels.is_empty());
     html! {
-        @let (by, unit) = if noise.duration_s < 7200.0 { (60.0, "min") } else { (3600.0, "h") };
-        p { "From " (number(noise.duration_s, 1.0 / by, unit)) " at rest at " (number(noise.sample_rate_hz, 1.0, "Hz")) ", of the unit " (noise.device) "." }
-        @for sensor in Sensor::BOTH {
-            @let channels = noise.of(sensor);
-            @if !channels.is_empty() { (coefficients(sensor, &channels, noise.confidence)) }
-        }
+        p { "From " (shown(noise.duration_s, 1.0 / by, unit)) " at rest at " (shown(noise.sample_rate_hz, 1.0, "Hz")) ", of the unit " (noise.device) "." }
+        @for (sensor, channels) in sensors() { (coefficients(*sensor, channels, noise.confidence)) }
         figure {
-            div class="figures" {
-                @for sensor in Sensor::BOTH {
-                    @let channels = noise.of(sensor);
-                    @if !channels.is_empty() { (drawn(sensor, &channels, noise)) }
-                }
-            }
+            div class="figures" { @for (sensor, channels) in sensors() { (drawn(*sensor, channels, noise)) } }
             figcaption { "Allan deviation computed from the coefficients in the table: N, B, K and Q. Coefficients that the record does not show are left out." }
         }
     }
@@ -36,89 +35,57 @@ pub fn section(noise: &NoiseFile) -> Markup {
 
 fn coefficients(sensor: Sensor, channels: &[&NoiseChannel], confidence: f64) -> Markup {
     let terms = [Term::N, Term::B, Term::K];
-    html! {
-        div class="scroll" { table {
-            caption { (spoken(sensor)) ": noise coefficients with " (format!("{:.0}", 100.0 * confidence)) " % intervals" }
-            thead { tr {
-                th { "channel" }
-                @for term in terms { th class="n" { (term.letter()) ", " (term.name()) (unit_of(channels, term)) } }
-            } }
-            tbody {
-                @for channel in channels {
-                    tr {
-                        td { (channel.name) @if let Some(t) = channel.temp_c { ", " (number(t, 1.0, "°C")) } }
-                        @for term in terms {
-                            @match channel.get(term) {
-                                Ok(c) => td class="n" {
-                                    @let unit = readable::noise(&c.unit).remove(0);
-                                    (number(c.value, unit.factor, "")) " (" (number(c.lower, unit.factor, "")) " to "
-                                    (number(c.upper, unit.factor, "")) ")"
-                                },
-                                // The noise file says how to determine it.
-                                Err(why) => td { span class="dim" { (why.split(';').next().unwrap_or(why)) } },
-                            }
-                        }
-                    }
-                }
-            }
+    let caption = format!(
+        "{}: noise coefficients with {:.0} % intervals",
+        spoken(sensor),
+        100.0 * confidence
+    );
+    html! { (table(&caption, &html! { th { "channel" } @for term in terms {
+        // All channels of a sensor have the same unit.
+        th.n { (term.letter()) ", " (term.name()) @if let Some(c) = channels.iter().find_map(|c| c.get(term).ok()) { ", " (readable::noise(&c.unit)[0].unit) } }
+    } }, &html! { @for channel in channels { tr {
+        td { (channel.name) @if let Some(t) = channel.temp_c { (format!(", {t:.1} °C")) } }
+        @for term in terms { @match channel.get(term) {
+            Ok(c) => (between(c.value, [c.lower, c.upper], readable::noise(&c.unit)[0].factor)),
+            // The noise file says how to determine it.
+            Err(why) => td { span.dim { (why.split(';').next().unwrap_or(why)) } },
         } }
-    }
-}
-
-/// Unit of a column, after a comma. All channels of a sensor have the same.
-fn unit_of(channels: &[&NoiseChannel], term: Term) -> String {
-    let known = channels.iter().find_map(|c| c.get(term).ok());
-    known.map_or_else(String::new, |c| {
-        format!(", {}", readable::noise(&c.unit)[0].unit)
-    })
+    } } })) }
 }
 
 fn deviation(channel: &NoiseChannel, tau_s: f64) -> f64 {
     let squared = |term| channel.get(term).map_or(0.0, |c| c.value.powi(2));
-    let variance = 3.0 * squared(Term::Q) / tau_s.powi(2)
-        + squared(Term::N) / tau_s
-        + FLOOR * squared(Term::B)
-        + squared(Term::K) * tau_s / 3.0;
-    variance.sqrt()
+    let (quantization, white) = (
+        3.0 * squared(Term::Q) / tau_s.powi(2),
+        squared(Term::N) / tau_s,
+    );
+    (quantization + white + FLOOR * squared(Term::B) + squared(Term::K) * tau_s / 3.0).sqrt()
 }
 
 fn drawn(sensor: Sensor, channels: &[&NoiseChannel], noise: &NoiseFile) -> Markup {
     let unit = readable::noise(&channels[0].unit).remove(0);
     let (from, to) = (2.0 / noise.sample_rate_hz, noise.duration_s / 8.0);
     let at = |k: usize| from * (to / from).powf(k as f64 / (POINTS - 1) as f64);
-    let curve = |channel: &NoiseChannel| -> Vec<(f64, f64)> {
-        let each = (0..POINTS).map(at);
-        each.map(|t| (t, deviation(channel, t) * unit.factor))
+    let curve = |channel: &&NoiseChannel| {
+        (0..POINTS)
+            .map(|k| (at(k), deviation(channel, at(k)) * unit.factor))
             .collect()
     };
-    let curves: Vec<_> = channels.iter().map(|c| curve(c)).collect();
+    let curves: Vec<Vec<(f64, f64)>> = channels.iter().map(curve).collect();
     let values = || curves.iter().flatten().map(|p| p.1).filter(|v| *v > 0.0);
-    let low = values().fold(f64::INFINITY, f64::min) / 1.4;
-    let high = values().fold(0.0, f64::max) * 1.4;
-    let panel = Panel::ONE;
-    let frame = panel.frame(from.log10()..to.log10(), low.log10()..high.log10());
-    let name = format!("Allan deviation, {}", unit.unit);
-    panel.drawing(
-        &format!("Allan deviation of the {sensor}"),
-        None,
-        &html! {
-            (frame.grid(spoken(sensor), &decades(&(from..to)), &decades(&(low..high)), true))
-            (frame.y_name(&name))
-            (frame.x_name("averaging time, s", &frame))
-            @for (k, curve) in curves.iter().enumerate() {
-                (line(&frame, CLASSES[k % 3], curve))
-            }
-            (legend(&frame, channels))
-        },
-    )
-}
-
-fn line(frame: &Frame, class: &str, points: &[(f64, f64)]) -> Markup {
-    frame.line(class, points.iter().map(|p| (p.0.log10(), p.1.log10())))
-}
-
-fn legend(frame: &Frame, channels: &[&NoiseChannel]) -> Markup {
-    let names: Vec<&str> = channels.iter().map(|c| c.name.as_str()).collect();
+    let (low, high) = (
+        values().fold(f64::INFINITY, f64::min) / 1.4,
+        values().fold(0.0, f64::max) * 1.4,
+    );
+    let frame = Panel::ONE.frame(from.log10()..to.log10(), low.log10()..high.log10());
+    let names = channels.iter().map(|c| c.name.as_str());
     let entries: Vec<(&str, &str)> = CLASSES.into_iter().cycle().zip(names).collect();
-    frame.legend(&entries)
+    let inside = html! {
+        (frame.grid(spoken(sensor), &decades(&(from..to)), &decades(&(low..high)), true))
+        (frame.y_name(&format!("Allan deviation, {}", unit.unit)))
+        (frame.x_name("averaging time, s", &frame))
+        @for (k, curve) in curves.iter().enumerate() { (frame.line(CLASSES[k % 3], curve.iter().map(|p| (p.0.log10(), p.1.log10())))) }
+        (frame.legend(&entries))
+    };
+    Panel::ONE.drawing(&format!("Allan deviation of the {sensor}"), None, &inside)
 }

@@ -63,16 +63,14 @@ pub fn figure(prepared: &Prepared, calibration: &Calibration, accel: Option<&Pic
         path class="dot" d=(marks(false)) {}
         path class="far" d=(marks(true)) {}
     };
-    html! {
-        figure class="whole" {
-            div class="figures" { (Panel::ONE.drawing(&format!("{} poses on the sphere of directions", poses.len()), None, &drawn)) }
-            figcaption {
-                (poses.len()) " poses: the direction that points up, in the body frame. Left: z upward, right: z downward; equal areas, "
-                "with circles at 45° and 90° from z."
-                @if accel.is_some() { " Orange: the residual is more than " (FAR) " times the noise (" (far) ")." }
-            }
+    let label = format!("{} poses on the sphere of directions", poses.len());
+    html! { figure.whole {
+        div.figures { (Panel::ONE.drawing(&label, None, &drawn)) }
+        figcaption {
+            (poses.len()) " poses: the direction that points up, in the body frame. Left: z upward, right: z downward; equal areas, with circles at 45° and 90° from z."
+            @if accel.is_some() { " Orange: the residual is more than " (FAR) " times the noise (" (far) ")." }
         }
-    }
+    } }
 }
 
 /// Largest residual of a dwell with all effects, relative to its noise.

@@ -14,75 +14,58 @@ const MINUTE_S: f64 = 60.0;
 
 /// Raw readings of both sensors.
 pub fn figure(prepared: &Prepared) -> Markup {
-    let unit = prepared.manifest.raw_unit;
-    let used = |sensor| {
-        let all = prepared.dwells.list.iter();
-        all.filter(|d| d.faults[sensor].is_none()).count()
-    };
-    html! {
-        figure {
-            div class="figures" {
-                @for sensor in Sensor::BOTH {
-                    @if prepared.condensed.has_raw[sensor.channels()].contains(&true) {
-                        (drawn(prepared, sensor, &unit.to_string()))
-                    }
-                }
-            }
-            figcaption {
-                "Raw readings. Shaded: dwells that were used, "
-                (used(Sensor::Gyro)) " for the gyro and " (used(Sensor::Accel)) " for the accelerometer of " (prepared.dwells.list.len()) "."
-            }
+    let all = &prepared.dwells.list;
+    let used = |sensor| all.iter().filter(|d| d.faults[sensor].is_none()).count();
+    let recorded = |sensor: &Sensor| prepared.condensed.has_raw[sensor.channels()].contains(&true);
+    html! { figure {
+        div class="figures" { @for sensor in Sensor::BOTH.into_iter().filter(recorded) { (drawn(prepared, sensor)) } }
+        figcaption {
+            "Raw readings. Shaded: dwells that were used, " (used(Sensor::Gyro)) " for the gyro and " (used(Sensor::Accel)) " for the accelerometer of " (all.len()) "."
         }
-    }
+    } }
 }
 
-fn drawn(prepared: &Prepared, sensor: Sensor, unit: &str) -> Markup {
+fn drawn(prepared: &Prepared, sensor: Sensor) -> Markup {
     let blocks = &prepared.condensed.blocks;
     let every = blocks.len().div_ceil(POINTS).max(1);
     let curve = |channel: usize| -> Vec<(f64, f64)> {
-        let each = blocks.chunks(every).map(|few| {
+        let each = blocks.chunks(every).flat_map(|few| {
             let means = || {
                 few.iter()
                     .map(|b| b.raw[channel].mean)
                     .filter(|m| m.is_finite())
             };
             let t = few[0].start_s / MINUTE_S;
-            let (low, high) = (
-                means().fold(f64::INFINITY, f64::min),
-                means().fold(f64::NEG_INFINITY, f64::max),
-            );
-            match every {
-                1 => vec![(t, low)],
-                _ => vec![(t, low), (t, high)],
-            }
+            let ends = [
+                (t, means().fold(f64::INFINITY, f64::min)),
+                (t, means().fold(f64::NEG_INFINITY, f64::max)),
+            ];
+            ends.into_iter().take(every.min(2))
         });
-        each.flatten().filter(|p| p.1.is_finite()).collect()
+        each.filter(|p| p.1.is_finite()).collect()
     };
     let curves: Vec<_> = sensor.channels().map(curve).collect();
-    let panel = Panel::ONE;
-    let frame = panel.frame(
+    let frame = Panel::ONE.frame(
         range(blocks.iter().map(|b| b.start_s / MINUTE_S)),
         range(curves.iter().flatten().map(|p| p.1)),
     );
-    let dwells: Vec<(f64, f64)> = prepared
-        .dwells
-        .list
-        .iter()
-        .filter(|d| d.faults[sensor].is_none())
-        .map(|d| (d.start_s / MINUTE_S, (d.start_s + d.duration_s) / MINUTE_S))
-        .collect();
-    let unit = if unit == "SI" { sensor.unit() } else { unit };
+    let all = prepared.dwells.list.iter();
+    let used = all.filter(|d| d.faults[sensor].is_none());
+    let minutes = |s: f64| s / MINUTE_S;
+    let ends = used.map(|d| (minutes(d.start_s), minutes(d.start_s + d.duration_s)));
+    let dwells: Vec<(f64, f64)> = ends.collect();
+    let unit = match prepared.manifest.raw_unit.to_string() {
+        unit if unit == "SI" => sensor.unit().into(),
+        unit => unit,
+    };
     let entries: Vec<(&str, &str)> = CLASSES.into_iter().zip(AXES).collect();
-    panel.drawing(
-        &format!("raw {sensor} over time"),
-        None,
-        &html! {
-            (frame.spans("block", &dwells))
-            (frame.axes(spoken(sensor), true))
-            (frame.y_name(&format!("reading, {unit}")))
-            (frame.x_name("time, min", &frame))
-            @for (class, curve) in CLASSES.iter().zip(&curves) { (frame.line(class, curve.iter().copied())) }
-            (frame.legend(&entries))
-        },
-    )
+    let inside = html! {
+        (frame.spans("block", &dwells))
+        (frame.axes(spoken(sensor), true))
+        (frame.y_name(&format!("reading, {unit}")))
+        (frame.x_name("time, min", &frame))
+        @for (class, curve) in CLASSES.iter().zip(&curves) { (frame.line(class, curve.iter().copied())) }
+        (frame.legend(&entries))
+    };
+    Panel::ONE.drawing(&format!("raw {sensor} over time"), None, &inside)
 }
