@@ -353,19 +353,14 @@ fn one_bias(prepared: &mut Prepared) {
         let (Ok(steps), Some(to_raw)) = (steps, first.matrix.try_inverse()) else {
             return;
         };
-        for (i, dwell) in prepared.dwells.list.iter_mut().enumerate() {
-            let later = prepared.power_ons.later(i);
-            let step = later.checked_sub(1).map(|k| to_raw * steps[k]);
-            let accel = &mut dwell.raw[Sensor::Accel.channels()];
-            for (mean, step) in accel.iter_mut().zip(step.iter().flatten()) {
-                mean.mean += step;
-            }
-        }
+        let raw: Vec<_> = steps.iter().map(|step| to_raw * step).collect();
+        let power_ons = prepared.power_ons.clone();
+        prepared.move_to_one_bias(Sensor::Accel, &power_ons, &raw);
     }
 }
 
-/// How often the accelerometer's steps are found: the scale factors that move its readings err by a few per cent at first.
-const BIAS_ROUNDS: usize = 3;
+/// How often the steps of biases are found: the scale factors that move the readings err by a few per cent at first.
+pub(crate) const BIAS_ROUNDS: usize = 3;
 
 /// Leaves out what `find` finds. Returns the triad fitted with everything, if anything was left out.
 fn leave_out(prepared: &mut Prepared, find: impl Fn(&Prepared) -> Outlying) -> Option<Triad> {
@@ -487,7 +482,7 @@ fn tested(
     let sum = |of: fn(&Scatter) -> f64| groups.clone().map(|(_, s)| of(s)).sum::<f64>();
     let rows = each * residuals.len() as f64;
     match unseen.is_empty() {
-        false => Test::of(unseen, (sum(|s| s.dof), rows)),
+        false => Test::of(unseen, (sum(|s| s.dof), rows), 0.0),
         true => {
             let all = Scatter {
                 chi2: sum(|s| s.chi2),
