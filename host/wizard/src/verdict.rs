@@ -63,7 +63,10 @@ impl SensorJudged {
             after: found.rms,
             floor: found.noise_floor,
             promised,
-            predicted: found.test.map_or(found.noise_floor, |test| test.predicted),
+            // The test counts both angles of a turn by themselves, and the figure is the angle between two directions.
+            predicted: found.test.map_or(found.noise_floor, |test| {
+                found.noise_floor * test.predicted / test.noise
+            }),
             ratio: found
                 .test
                 .map_or(found.rms / found.noise_floor, |test| test.ratio),
