@@ -36,6 +36,7 @@ use crate::unseen::{Test, Unseen};
 use crate::warning::Warning;
 use mimu_core::PerSensor;
 use mimu_recording::error::{Argument, Error, Result};
+use mimu_recording::units::median;
 use mimu_recording::{RawUnit, Reference};
 
 use crate::observable::Observable;
@@ -505,9 +506,7 @@ pub(crate) fn refuse_wrong_gravity(
         let stand = observations
             .iter()
             .filter(|o| !prepared.dwells.list[o.dwell].moves(sensor));
-        let mut sizes: Vec<f64> = stand.map(|o| o.input.norm()).collect();
-        sizes.sort_by(f64::total_cmp);
-        let typical = sizes.get(sizes.len() / 2).copied().unwrap_or(g);
+        let typical = median(stand.map(|o| o.input.norm()).collect()).unwrap_or(g);
         if (0.8..1.2).contains(&typical) {
             let problem =
                 format!("the known forces have a magnitude of {typical:.3}, so they are in g");
@@ -519,9 +518,8 @@ pub(crate) fn refuse_wrong_gravity(
         }
     }
     if sensor == Sensor::Accel && prepared.manifest.raw_unit == RawUnit::Si {
-        let mut sizes: Vec<f64> = observations.iter().map(|o| o.raw.norm()).collect();
-        sizes.sort_by(f64::total_cmp);
-        let typical = sizes[sizes.len() / 2];
+        let sizes = observations.iter().map(|o| o.raw.norm());
+        let typical = median(sizes.collect()).unwrap_or(g);
         if (0.5..2.0).contains(&typical) {
             let problem = format!(
                 "raw_unit = \"SI\", but at rest the accelerometer reads {typical:.3}, so it is in g"

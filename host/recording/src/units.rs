@@ -78,7 +78,8 @@ fn norm(v: &[f64; 3]) -> f64 {
     v.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
-fn median(values: Vec<f64>) -> Option<f64> {
+/// The median of the finite values; of an even number of them, the larger of the two in the middle. `None` without any.
+pub fn median(values: Vec<f64>) -> Option<f64> {
     quantile(values, 0.5)
 }
 
