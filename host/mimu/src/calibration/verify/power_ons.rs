@@ -18,7 +18,7 @@ use crate::signal::power_ons::PowerOns;
 /// The bias of a power-on beside the one that a calibration is judged in.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct BiasMoved {
-    /// Time of its first sample, s.
+    /// Time of its first sample, s; null in JSON for the power-on before the first restart.
     pub t_s: f64,
     /// By how much the output without input is more, x, y, z, SI.
     pub moved: [f64; 3],
