@@ -6,7 +6,6 @@ use std::sync::Arc;
 use mimu::fit::{Fit, Options, fit};
 use mimu::plan::design::Problem;
 use mimu::plan::design::budget::DwellNoise;
-use mimu::plan::design::judgement::HALF_95;
 use mimu::plan::design::model::{Model, Terms};
 use mimu::plan::design::population::Population;
 use mimu::plan::design::reach::Fixture;
@@ -14,8 +13,8 @@ use mimu::prior::Prior;
 use mimu::{Angles, Calibration, Sensor};
 use mimu_fleet::measured::OfCalibration;
 use mimu_fleet::tree::{Measurement, Tree};
-use mimu_recording::Reference;
 use mimu_recording::error::Result;
+use mimu_recording::{NORMAL_95, Reference};
 use mimu_rig::hands::HandsTruth;
 use mimu_rig::located::Source;
 use mimu_rig::random::Random;
@@ -303,7 +302,7 @@ impl Promise {
             let judged = problem.judge(settings, sigma);
             OF_DESIGN.map(|k| {
                 let of = &judged.parameters[k];
-                HALF_95 * of.sigma * of.parameter.si
+                NORMAL_95 * of.sigma * of.parameter.si
             })
         };
         let mut plan =

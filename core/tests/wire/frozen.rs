@@ -4,6 +4,7 @@
 // Fields that are not written out belong to later versions.
 #![allow(clippy::needless_update)]
 
+use super::golden::hex;
 use mimu_core::PerSensor;
 use mimu_core::wire::{
     Capabilities, Compatibility, Counters, Decoder, EFFECTS, Event, Greeting, MAGIC, Message,
@@ -47,18 +48,10 @@ const SELF_TEST_LONGER: &str = "00110107024e0b6779726f20782c20535431010580be0156
 /// With a reason of a later version, number 99, with three bytes.
 const UNKNOWN_REFUSAL: &str = "000b0207630102035add44cd00";
 
-fn bytes(hex: &str) -> Vec<u8> {
-    let digits: Vec<u8> = hex
-        .chars()
-        .filter_map(|c| Some(c.to_digit(16)? as u8))
-        .collect();
-    digits.chunks(2).map(|d| d[0] << 4 | d[1]).collect()
-}
-
 /// Calls `look` with the message in the frame.
-fn read<T>(hex: &str, look: impl Fn(&Message<'_>) -> T) -> T {
+fn read<T>(text: &str, look: impl Fn(&Message<'_>) -> T) -> T {
     let mut decoder = Decoder::new();
-    let frame = bytes(hex);
+    let frame = hex(text);
     let (last, before) = frame.split_last().unwrap();
     for byte in before {
         assert_eq!(decoder.push(*byte), None);
@@ -148,7 +141,7 @@ fn a_greeting_of_3_0_is_read_for_ever() {
     let mut room = [0; 528];
     let sent = postcard::to_slice(&message, &mut room).unwrap();
     let mut decoder = Decoder::new();
-    let frame = bytes(GREETING);
+    let frame = hex(GREETING);
     let payload = frame
         .iter()
         .find_map(|b| Some(decoder.push(*b)?.0.to_vec()));

@@ -10,7 +10,7 @@ use mimu_core::wire::{
 use mimu_core::{PerSensor, Sensor};
 use serde::{Deserialize, Serialize};
 
-fn hex(text: &str) -> Vec<u8> {
+pub fn hex(text: &str) -> Vec<u8> {
     let digits: Vec<u8> = text
         .chars()
         .filter(|c| !c.is_whitespace())

@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 
 use mimu::data_sheet::{Property, Row};
 use mimu::quantity::Sensor;
+use mimu_recording::NORMAL_95;
 use serde::Serialize;
 
 /// A property of an axis over the fleet.
@@ -45,9 +46,6 @@ pub struct Capability {
 
 /// Fewest units with an index.
 const FEWEST: usize = 5;
-
-/// Half of a 95 % interval of a normal variable in standard deviations.
-const NORMAL_95: f64 = 1.959_963_984_540_054;
 
 type Key = (bool, &'static str, &'static str);
 

@@ -1,6 +1,7 @@
 //! Repeatability and reproducibility of all parameters, and of the properties with limits.
 
 use mimu::data_sheet::Row;
+use mimu_recording::NORMAL_95;
 use rayon::prelude::*;
 
 use crate::capability::tolerance;
@@ -100,9 +101,6 @@ fn of_triads(triads: &[Triad]) -> Vec<Value> {
         .flat_map(|t| (0..t.n()).map(move |i| of(t, i)))
         .collect()
 }
-
-/// Half of a 95 % interval of a normal variable in standard deviations.
-const NORMAL_95: f64 = 1.959_963_984_540_054;
 
 fn of_properties(all: &[Measurement]) -> Vec<Value> {
     let Some(first) = all.iter().map(|m| &m.properties).max_by_key(|p| p.len()) else {

@@ -3,7 +3,7 @@
 use mimu::nalgebra::DMatrix;
 use mimu::quantity::Sensor;
 use mimu::sessions::between::Estimates;
-use mimu_recording::Reference;
+use mimu_recording::{NORMAL_95, Reference};
 
 use crate::measured::Basis;
 use crate::population::{self, Population};
@@ -52,8 +52,6 @@ pub struct Triad {
     pub fit: DMatrix<f64>,
 }
 
-/// Half of a 95 % interval of a normal variable in standard deviations.
-const NORMAL_95: f64 = 1.959_963_984_540_054;
 /// Bins of a histogram, over this many standard deviations on both sides of the mean.
 const BINS: usize = 41;
 const SIGMAS: f64 = 5.125;

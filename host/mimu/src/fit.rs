@@ -36,6 +36,7 @@ use crate::unseen::{Test, Unseen};
 use crate::warning::Warning;
 use mimu_core::PerSensor;
 use mimu_recording::error::{Argument, Error, Result};
+use mimu_recording::units::median;
 use mimu_recording::{RawUnit, Reference};
 
 use crate::observable::Observable;
@@ -353,19 +354,14 @@ fn one_bias(prepared: &mut Prepared) {
         let (Ok(steps), Some(to_raw)) = (steps, first.matrix.try_inverse()) else {
             return;
         };
-        for (i, dwell) in prepared.dwells.list.iter_mut().enumerate() {
-            let later = prepared.power_ons.later(i);
-            let step = later.checked_sub(1).map(|k| to_raw * steps[k]);
-            let accel = &mut dwell.raw[Sensor::Accel.channels()];
-            for (mean, step) in accel.iter_mut().zip(step.iter().flatten()) {
-                mean.mean += step;
-            }
-        }
+        let raw: Vec<_> = steps.iter().map(|step| to_raw * step).collect();
+        let power_ons = prepared.power_ons.clone();
+        prepared.move_to_one_bias(Sensor::Accel, &power_ons, &raw);
     }
 }
 
-/// How often the accelerometer's steps are found: the scale factors that move its readings err by a few per cent at first.
-const BIAS_ROUNDS: usize = 3;
+/// How often the steps of biases are found: the scale factors that move the readings err by a few per cent at first.
+pub(crate) const BIAS_ROUNDS: usize = 3;
 
 /// Leaves out what `find` finds. Returns the triad fitted with everything, if anything was left out.
 fn leave_out(prepared: &mut Prepared, find: impl Fn(&Prepared) -> Outlying) -> Option<Triad> {
@@ -487,7 +483,7 @@ fn tested(
     let sum = |of: fn(&Scatter) -> f64| groups.clone().map(|(_, s)| of(s)).sum::<f64>();
     let rows = each * residuals.len() as f64;
     match unseen.is_empty() {
-        false => Test::of(unseen, (sum(|s| s.dof), rows)),
+        false => Test::of(unseen, (sum(|s| s.dof), rows), 0.0),
         true => {
             let all = Scatter {
                 chi2: sum(|s| s.chi2),
@@ -510,9 +506,7 @@ pub(crate) fn refuse_wrong_gravity(
         let stand = observations
             .iter()
             .filter(|o| !prepared.dwells.list[o.dwell].moves(sensor));
-        let mut sizes: Vec<f64> = stand.map(|o| o.input.norm()).collect();
-        sizes.sort_by(f64::total_cmp);
-        let typical = sizes.get(sizes.len() / 2).copied().unwrap_or(g);
+        let typical = median(stand.map(|o| o.input.norm()).collect()).unwrap_or(g);
         if (0.8..1.2).contains(&typical) {
             let problem =
                 format!("the known forces have a magnitude of {typical:.3}, so they are in g");
@@ -524,9 +518,8 @@ pub(crate) fn refuse_wrong_gravity(
         }
     }
     if sensor == Sensor::Accel && prepared.manifest.raw_unit == RawUnit::Si {
-        let mut sizes: Vec<f64> = observations.iter().map(|o| o.raw.norm()).collect();
-        sizes.sort_by(f64::total_cmp);
-        let typical = sizes[sizes.len() / 2];
+        let sizes = observations.iter().map(|o| o.raw.norm());
+        let typical = median(sizes.collect()).unwrap_or(g);
         if (0.5..2.0).contains(&typical) {
             let problem = format!(
                 "raw_unit = \"SI\", but at rest the accelerometer reads {typical:.3}, so it is in g"

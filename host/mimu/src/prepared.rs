@@ -143,8 +143,9 @@ impl Prepared {
             Dwells::find(condensed, &manifest, search)
                 .map_err(|e| e.map(|e| e.place = format!("{place}, {}", e.place)))
         };
+        let mut spans = Vec::new();
         if by_hand {
-            condensed = with_one_bias(condensed, &manifest, find);
+            (condensed, spans) = with_one_bias(condensed, &manifest, find);
         }
         let mut dwells = find(&condensed)?;
         let at = manifest.latitude_deg;
@@ -160,12 +161,8 @@ impl Prepared {
             .warnings
             .extend(bias_removal.map(Warning::BiasRemoved));
         let noise = Noise::within(&dwells.list, &condensed, &dwells.rails);
-        let power_ons = match by_hand {
-            true => PowerOns::of(&dwells.list, &manifest),
-            false => PowerOns::default(),
-        };
         let prepared = Self {
-            power_ons,
+            power_ons: PowerOns::of(&dwells.list, spans),
             reference_error: manifest.reference_error.clone(),
             manifest,
             condensed: Arc::new(condensed),
@@ -260,6 +257,33 @@ impl Prepared {
             self.dwells.list[dwell.from].faults.accel = Some(Fault::Outlying);
         }
         self.dwells.left_out.extend_from_slice(these);
+    }
+
+    /// Adds this to what `sensor` read in this time, s: to the means of its dwells, and to the integrals of a gyro.
+    pub(crate) fn add_between(&mut self, sensor: Sensor, raw: &Vector3<f64>, between_s: [f64; 2]) {
+        if sensor == Sensor::Gyro {
+            Arc::make_mut(&mut self.condensed).add_to_gyro(raw, between_s);
+        }
+        let [from_s, to_s] = between_s;
+        let dwells = self.dwells.list.iter_mut();
+        for dwell in dwells.filter(|d| from_s <= d.start_s && d.start_s < to_s) {
+            let means = dwell.raw[sensor.channels()].iter_mut();
+            means.zip(raw).for_each(|(mean, more)| mean.mean += more);
+        }
+    }
+
+    /// Moves what `sensor` read in each of these power-ons, from the first on, to the bias of number 0: by how much they differ, raw.
+    pub(crate) fn move_to_one_bias(
+        &mut self,
+        sensor: Sensor,
+        power_ons: &PowerOns,
+        steps: &[Vector3<f64>],
+    ) {
+        for (number, step) in (1..).zip(steps) {
+            if let Some(between_s) = power_ons.between_s(&self.dwells.list, number) {
+                self.add_between(sensor, step, between_s);
+            }
+        }
     }
 
     /// Whether the recording has the channels of `sensor`.

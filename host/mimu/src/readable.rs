@@ -7,8 +7,7 @@ use std::borrow::Cow;
 
 use crate::quantity::{Figure, Sensor, significant};
 
-/// Standard gravity, for g, mg and µg, m/s².
-pub const STANDARD_GRAVITY: f64 = 9.80665;
+pub use mimu_recording::units::STANDARD_GRAVITY;
 
 const DEG: f64 = 180.0 / std::f64::consts::PI;
 const HOUR: f64 = 3600.0;

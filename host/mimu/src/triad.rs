@@ -1,6 +1,7 @@
 //! Calibration of one triad: inverse and forward model, their covariances, and the physical quantities.
 
 use mimu_core::compensation::Affine;
+use mimu_recording::NORMAL_95;
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, StudentsT};
@@ -146,9 +147,6 @@ fn students_factor(dof: f64) -> f64 {
             + (5.0 * z.powi(5) + 16.0 * z.powi(3) + 3.0 * z) / (96.0 * dof * dof)
     }
 }
-
-/// Half of a 95 % interval of a normal variable, in sigmas.
-pub(crate) const NORMAL_95: f64 = 1.959_963_984_540_054;
 
 /// Calibration of one triad.
 #[derive(Debug, Clone, PartialEq)]

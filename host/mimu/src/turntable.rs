@@ -11,10 +11,9 @@ use crate::observation::turn::Rest;
 use crate::prepared::Prepared;
 use crate::quantity::{Sensor, significant};
 use crate::signal::dwell::Fault;
-use crate::triad::NORMAL_95;
 use crate::warning::Warning;
 use mimu_recording::error::{Argument, Error, Result};
-use mimu_recording::{RawUnit, Turntable};
+use mimu_recording::{NORMAL_95, RawUnit, Turntable};
 
 /// Expected standard deviation of a reading at rest over the largest rate, by the wander of the bias; and of a reading at a rate over that rate, by scale
 /// factors that differ from axis to axis.

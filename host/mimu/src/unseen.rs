@@ -100,8 +100,9 @@ pub fn fewest(count: usize, each: f64, parameters: f64) -> Option<usize> {
 
 impl Test {
     /// Of all `parts`, in each of which all errors were unseen. The model was fitted to `rows` errors like these, with so many degrees of freedom `dof`;
-    /// infinite for a model that was fitted to other data. `None` without an error, or if the noise is not known.
-    pub fn of(parts: &[Unseen], (dof, rows): (f64, f64)) -> Option<Self> {
+    /// infinite for a model that was fitted to other data. So many numbers were `taken` from the errors themselves, such as the biases of power-ons. `None`
+    /// without an error, or if the noise is not known.
+    pub fn of(parts: &[Unseen], (dof, rows): (f64, f64), taken: f64) -> Option<Self> {
         let count: usize = parts.iter().map(|p| p.errors.len()).sum();
         let noise: f64 = parts.iter().map(|p| p.noise.sum()).sum();
         if count == 0 || !(noise > 0.0) {
@@ -114,15 +115,17 @@ impl Test {
             seen += part.noise.dot(&part.predicted.precisions()?);
             predicted += part.predicted.variances().sum();
         }
+        let left = (n - taken).max(1.0);
         let dof = match dof.is_finite() {
             true => dof * n / rows,
             false => n,
         };
+        let dof = dof - taken;
         let limit = limit(dof);
         Some(Self {
-            ratio: (squares / n).sqrt(),
+            ratio: (squares / left).sqrt(),
             limit,
-            visible: visible(limit, seen / n),
+            visible: visible(limit, seen / n * (left / n)),
             predicted: (predicted / n).sqrt(),
             noise: (noise / n).sqrt(),
             count,

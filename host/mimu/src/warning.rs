@@ -87,6 +87,14 @@ pub enum Warning {
     /// Power-ons within the recording before the last one.
     #[error("the device restarted within it: {} its own biases, and those given are of the last", match .others { 1 => "the power-on before has".to_string(), n => format!("each of the {n} power-ons before has") })]
     PowerOns { others: usize },
+    /// The bias of a sensor in a power-on beside the one that a calibration is judged in: from when on, s, by how much it is more, and half of the 95 % intervals, SI.
+    #[error(fmt = words::bias_moved)]
+    BiasMoved {
+        sensor: Sensor,
+        t_s: f64,
+        moved: [f64; 3],
+        half_width: [f64; 3],
+    },
     /// Sample rate that no inertial unit has, Hz.
     #[error("{} Hz is not the sample rate of an inertial unit: are the times in ms or µs instead of s? All rates and the scale factors of the gyro would be wrong by the same factor", significant(*.rate_hz))]
     ImplausibleRate { rate_hz: f64 },

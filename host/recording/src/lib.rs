@@ -70,7 +70,7 @@ pub use manifest::{
 pub use parents::Parents;
 pub use reader::{ReadSummary, Recording};
 pub use recorded::{Recorded, Restart, SensorSetting, SensorSettings};
-pub use reference_error::ReferenceError;
+pub use reference_error::{NORMAL_95, ReferenceError};
 pub use separator::Separator;
 pub use toml_file::{check_kind, parse_toml, read_text};
 pub use turntable::{Turntable, TurntableRate, rate_error};

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use crate::error::{Error, Result};
 
 /// Half of a 95 % interval of a normal variable, in standard deviations.
-const HALF_WIDTH_95: f64 = 1.959_963_984_540_054;
+pub const NORMAL_95: f64 = 1.959_963_984_540_054;
 
 /// Errors of the reference, each half of a 95 % interval about zero unless [`rectangular`](Self::rectangular) names it. All dwells share an error, but [`level_deg`](Self::level_deg). 0: none.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -56,7 +56,7 @@ impl ReferenceError {
             value
                 / match self.is_rectangular(key) {
                     true => 3.0_f64.sqrt(),
-                    false => HALF_WIDTH_95,
+                    false => NORMAL_95,
                 }
         };
         Self {

@@ -21,8 +21,10 @@ const ACCELERATED: f64 = 0.15;
 const FEWEST: usize = 5;
 /// Largest ratio of a unit's turns to those of gravity, and inverse of the smallest. Analog gyros in volts begin at a factor of 1.9.
 const TURNS_WITHIN: f64 = 1.5;
+/// Standard gravity, for g, mg and µg, m/s².
+pub const STANDARD_GRAVITY: f64 = 9.80665;
 /// Gravity in each unit of an accelerometer, to within offsets of 0.15 g.
-const GRAVITY: [(&str, f64); 3] = [("m/s²", 9.80665), ("g", 1.0), ("mg", 1000.0)];
+const GRAVITY: [(&str, f64); 3] = [("m/s²", STANDARD_GRAVITY), ("g", 1.0), ("mg", 1000.0)];
 const OFF_GRAVITY: f64 = 0.15;
 /// Units of a gyro, rad/s.
 const RATES: [(&str, f64); 3] = [
@@ -76,7 +78,8 @@ fn norm(v: &[f64; 3]) -> f64 {
     v.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
-fn median(values: Vec<f64>) -> Option<f64> {
+/// The median of the finite values; of an even number of them, the larger of the two in the middle. `None` without any.
+pub fn median(values: Vec<f64>) -> Option<f64> {
     quantile(values, 0.5)
 }
 

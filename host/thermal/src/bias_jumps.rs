@@ -1,5 +1,6 @@
 //! Jumps of a gyro's bias while the unit does not move: the stress in a die relaxes. No row is left out for them.
 
+use mimu_recording::units::median;
 use nalgebra::Vector3;
 
 use crate::row::Row;
@@ -48,9 +49,8 @@ pub(crate) fn find(rows: &[Row], moved_s: &[f64]) -> Vec<BiasJump> {
         boundaries.push((k, change, trend, change / sigma));
     }
     let usual = Vector3::from_fn(|axis, _| {
-        let mut sizes: Vec<f64> = boundaries.iter().map(|b| b.3[axis].abs()).collect();
-        sizes.sort_by(f64::total_cmp);
-        OF_MEDIAN * sizes[sizes.len() / 2]
+        let sizes = boundaries.iter().map(|b| b.3[axis].abs());
+        OF_MEDIAN * median(sizes.collect()).unwrap_or(0.0)
     });
     let excess = |(_, change, trend, over): &(usize, Vector3<f64>, Vector3<f64>, Vector3<f64>)| {
         let each = (0..3).filter(|a| change[*a].abs() > JUMP_TRENDS * trend[*a].abs());

@@ -5,6 +5,7 @@ use mimu::signal::blocks::extent;
 use mimu::signal::blocks::{Block, Condensed};
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::health::Finding;
+use mimu_recording::units::median;
 
 /// Spacing of the series, s. A die's lag is tens of seconds.
 const STEP_S: f64 = 1.0;
@@ -282,12 +283,15 @@ fn runs(known: &[(f64, f64)]) -> Vec<[f64; 2]> {
     runs
 }
 
+/// Median length of the runs, s; 0 without any.
+fn usual_length(runs: &[[f64; 2]]) -> f64 {
+    median(runs.iter().map(|r| r[1] - r[0]).collect()).unwrap_or(0.0)
+}
+
 fn check_stuck(known: &[(f64, f64)], place: &str) -> Result<()> {
     let runs = runs(known);
-    let mut lengths: Vec<f64> = runs.iter().map(|r| r[1] - r[0]).collect();
-    lengths.sort_by(f64::total_cmp);
     // The usual length by number of runs: a coarse thermometer repeats its value for a while everywhere.
-    let usual = lengths[lengths.len() / 2].max(STEP_S);
+    let usual = usual_length(&runs).max(STEP_S);
     let longest = runs
         .iter()
         .max_by(|a, b| (a[1] - a[0]).total_cmp(&(b[1] - b[0])));
@@ -341,7 +345,5 @@ fn check_jumps(series: &Thermometer, power_on_s: f64, place: &str) -> Result<()>
 
 /// A coarse thermometer is smoothed over the time that it takes from one of its values to the next.
 fn smoothing(known: &[(f64, f64)]) -> f64 {
-    let mut lengths: Vec<f64> = runs(known).iter().map(|r| r[1] - r[0]).collect();
-    lengths.sort_by(f64::total_cmp);
-    lengths[lengths.len() / 2].clamp(SMOOTHING_S, 12.0 * SMOOTHING_S)
+    usual_length(&runs(known)).clamp(SMOOTHING_S, 12.0 * SMOOTHING_S)
 }

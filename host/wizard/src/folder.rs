@@ -257,6 +257,26 @@ impl Folder {
         self.dwells(last?).last().map(|d| d.1)
     }
 
+    /// Cause of a restart after the last dwell of the calibration, if its recording or that of the verification names one.
+    pub fn restart_since_calibration(&self) -> Option<String> {
+        let ends = self.entries.iter().filter_map(|entry| match entry {
+            Entry::Dwell {
+                part: Part::Calibration,
+                from_s,
+                step,
+                ..
+            } => Some(from_s + step.dwell_s),
+            _ => None,
+        });
+        let end_s = ends.fold(f64::NEG_INFINITY, f64::max);
+        let parts = [Part::Calibration, Part::Verification].into_iter();
+        let written = parts.map(|part| self.file(part.name()).join(MANIFEST_FILE));
+        let recorded = written.filter_map(|path| Manifest::read(&path).ok()?.recorded);
+        let mut restarts = recorded.flat_map(|recorded| recorded.restarts);
+        let since = restarts.find(|restart| restart.t_s >= end_s);
+        since.map(|restart| restart.start)
+    }
+
     /// Poses of a recording that the user turned the unit to: requested and recorded direction up.
     pub fn shown(&self, of: Part) -> Vec<[Vector3<f64>; 2]> {
         let shown = self.entries.iter().filter_map(|entry| match entry {

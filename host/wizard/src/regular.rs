@@ -7,6 +7,7 @@
 use std::collections::VecDeque;
 
 use mimu::signal::increment::pause_periods;
+use mimu_recording::units::median;
 
 /// Time from which the rate is found, s. If the least delay varies by half a millisecond, the rate is known to 100 ppm: a twentieth of the target of
 /// a gyro's scale factor by hand.
@@ -177,11 +178,6 @@ impl Regular {
     }
 }
 
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
-}
-
 /// Period of lines from their times, despite delays and missing lines.
 fn period(times: &[f64], own_clock: bool) -> f64 {
     match own_clock.then(|| by_intervals(times)).flatten() {
@@ -199,7 +195,7 @@ const SPARSE: f64 = 1.4;
 fn by_intervals(times: &[f64]) -> Option<f64> {
     let intervals: Vec<f64> = times.windows(2).map(|t| t[1] - t[0]).collect();
     let mean = (times.last()? - times.first()?) / intervals.len() as f64;
-    let mut period = median(intervals.clone());
+    let mut period = median(intervals.clone()).unwrap_or(f64::NAN);
     if !(period > 0.0 && mean > 0.9 * period && mean < SPARSE * period) {
         return None;
     }
@@ -230,7 +226,8 @@ fn by_least_delays(times: &[f64], own_clock: bool) -> f64 {
     let apart = times.len() / 5;
     let pairs = times.iter().zip(&times[apart..]);
     // A gap lies within a fifth of the pairs, and does not change their median.
-    let mut period = median(pairs.map(|(a, b)| (b - a) / apart as f64).collect());
+    let slopes = pairs.map(|(a, b)| (b - a) / apart as f64);
+    let mut period = median(slopes.collect()).unwrap_or(f64::NAN);
     let mut least = Vec::new();
     for _ in 0..3 {
         let late = |k: &usize| times[*k] - *k as f64 * period;
@@ -242,7 +239,7 @@ fn by_least_delays(times: &[f64], own_clock: bool) -> f64 {
             .windows(2)
             .map(|p| late(&p[1]) - late(&p[0]))
             .collect();
-        let usual = median(steps.clone());
+        let usual = median(steps.clone()).unwrap_or(f64::NAN);
         // Both ends of a step are least delays. From half a period on, a missing line is more likely than none.
         let limit = 0.5 * period + if own_clock { 0.0 } else { JITTER_S };
         let leaps = steps.iter().filter(|s| (*s - usual).abs() > limit);

@@ -144,6 +144,16 @@ pub struct UnitSession {
     pub banks: Option<DeviceBanks>,
 }
 
+/// Why the unit has begun anew, if this event says so.
+fn restart(news: &StationEvent) -> Option<String> {
+    match news {
+        StationEvent::Restarted(why) => Some(why.clone()),
+        // Most boards have their supply from the same cable, and do not tell of a power-on.
+        StationEvent::Back(unit) if !unit.is_device => Some("the line came back".into()),
+        _ => None,
+    }
+}
+
 impl UnitSession {
     /// A unit with its folder.
     pub fn new(station: Station, folder: Folder, config: &SessionConfig) -> Self {
@@ -238,8 +248,13 @@ impl UnitSession {
                 "the session was interrupted, so they lack the dwells before",
             ),
         });
-        // Waiting events are from before this recording.
-        while self.station.news()?.is_some() {}
+        // Waiting events are from before this recording. It names a restart since the calibration at its first sample: its biases are others.
+        while let Some(news) = self.station.news()? {
+            self.restarted = restart(&news).or(self.restarted.take());
+        }
+        if self.number == 0 && part != Part::Calibration && self.restarted.is_none() {
+            self.restarted = self.folder.restart_since_calibration();
+        }
         self.pending.clear();
         (self.dwell, self.next) = (None, None);
         self.watch.interrupted();
@@ -267,6 +282,7 @@ impl UnitSession {
         let mut some = false;
         while let Some(news) = self.station.news()? {
             some = true;
+            self.restarted = restart(&news).or(self.restarted.take());
             match news {
                 StationEvent::Samples(chunk) => {
                     self.keep(&chunk);
@@ -281,7 +297,6 @@ impl UnitSession {
                     }
                 }
                 StationEvent::Restarted(why) => {
-                    self.restarted = Some(why.clone());
                     self.interrupted(Interruption::Restarted(why), tell)?;
                     if let Some(banks) = &mut self.banks {
                         banks.mark_incomplete(
@@ -305,10 +320,6 @@ impl UnitSession {
                 StationEvent::Back(unit) => {
                     let nameless = !unit.is_device;
                     self.lost_at = nameless.then_some(self.levels.len()).or(self.lost_at);
-                    if nameless {
-                        // Most boards have their supply from the same cable, and do not tell of a power-on.
-                        self.restarted = Some("the line came back".into());
-                    }
                     self.interrupted(Interruption::Back, tell)?;
                 }
             }

@@ -63,7 +63,10 @@ impl SensorJudged {
             after: found.rms,
             floor: found.noise_floor,
             promised,
-            predicted: found.test.map_or(found.noise_floor, |test| test.predicted),
+            // The test counts both angles of a turn by themselves, and the figure is the angle between two directions.
+            predicted: found.test.map_or(found.noise_floor, |test| {
+                found.noise_floor * test.predicted / test.noise
+            }),
             ratio: found
                 .test
                 .map_or(found.rms / found.noise_floor, |test| test.ratio),
@@ -186,12 +189,8 @@ pub fn prepared(directory: &Path) -> Result<Prepared> {
 
 /// Judges a calibration by the verification recording; `promised` is the fit that gave it.
 pub fn judge(by: &Prepared, calibration: &Calibration, promised: Option<&Fit>) -> Result<Judged> {
-    let recorded = by.manifest.recorded.as_ref();
-    let power_on = match recorded.is_some_and(|r| !r.restarts.is_empty()) {
-        true => PowerOn::Another,
-        false => PowerOn::Same,
-    };
-    let found = verify_since(by, calibration, power_on)?;
+    // The recording names every restart since the calibration.
+    let found = verify_since(by, calibration, PowerOn::Same)?;
     let of = |(sensor, s): (Sensor, &SensorVerification)| {
         let fitted = promised.and_then(|f| f.sensor(sensor));
         SensorJudged::of(sensor, s, fitted.and_then(|f| f.held_out_rms()))

@@ -190,7 +190,7 @@ fn errors_of_unseen_rows_exceed_the_limit_as_often_as_is_stated() {
             });
             let parts: Vec<Unseen> = parts.collect();
             let dof = (rows - parameters) as f64;
-            let test = Test::of(&parts, (dof, rows as f64)).expect("a test");
+            let test = Test::of(&parts, (dof, rows as f64), 0.0).expect("a test");
             failed += u32::from(test.fails());
             squares += test.ratio.powi(2);
         }

@@ -4,7 +4,6 @@ mod agreement;
 mod bias_removal;
 mod coverage;
 mod diagnosis;
-mod dwells_found;
 mod earth;
 mod few_poses;
 mod flaws;

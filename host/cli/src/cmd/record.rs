@@ -13,6 +13,7 @@ use mimu::plan::Plan;
 use mimu_device::Session;
 use mimu_device::record::{Known, RecordOptions, RecordingState, Steps, UserRequest, record};
 use mimu_recording::error::{Error, Result};
+use mimu_recording::units::STANDARD_GRAVITY;
 use mimu_recording::{Inputs, SampleFormat};
 
 use crate::arguments::JsonArgs;
@@ -72,7 +73,7 @@ impl RecordingArgs {
                 eprintln!(
                     "warning: gravity is assumed to be 9.80665 m/s². It ranges from 9.78 to 9.83, and every scale factor of the accelerometer errs by the same ratio: give --gravity or --latitude"
                 );
-                9.80665
+                STANDARD_GRAVITY
             }
         }
     }

@@ -269,41 +269,6 @@ fn several_units_have_a_line_and_a_file_each() {
 }
 
 #[test]
-fn three_sides_give_offsets_and_sensitivities_in_any_order() {
-    let folder = place();
-    let sides = [[0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]];
-    for (k, side) in sides.iter().enumerate() {
-        let rows = rows(&GOOD, &[*side], 8.0, 10 + k as u64);
-        record(folder.path(), &format!("side-{k}"), "unit-1", &rows);
-    }
-    let ran = mimu(
-        folder.path(),
-        "accept side-0 side-1 side-2 --faces --level 0.1 --limits limits.toml --json -",
-    );
-    assert_eq!(ran.status, Some(0), "{}{}", ran.out, ran.err);
-    let document: Value = serde_json::from_str(&ran.out).unwrap();
-    let mg = |counts: f64| counts / 16.384;
-    for (axis, offset) in [("x", mg(40.0)), ("y", 12.0), ("z", mg(-60.0))] {
-        let row = measurement(&document, &format!("accel_{axis}_offset"));
-        let [value, sigma] = ["value", "sigma"].map(|key| row[key].as_f64().unwrap());
-        // The table errs by hundredths of a degree; a tenth is allowed for.
-        assert!((value - offset).abs() < 2.0 * sigma && sigma < 2.0, "{row}");
-        let scale = measurement(&document, &format!("accel_{axis}_sensitivity"));
-        assert!(scale["value"].as_f64().unwrap().abs() < 0.3, "{scale}");
-    }
-    let same = mimu(
-        folder.path(),
-        "accept side-0 side-0 side-2 --faces --limits limits.toml",
-    );
-    assert_eq!(same.status, Some(1));
-    assert!(
-        same.err.contains("put a side of each axis up once"),
-        "{}",
-        same.err
-    );
-}
-
-#[test]
 fn limits_with_a_wrong_name_unit_or_order_are_refused_before_anything_is_measured() {
     let folder = place();
     for (from, to, words) in [

@@ -2,9 +2,11 @@
 
 mod causes;
 mod judged;
+mod power_ons;
 mod whole_turns;
 
 pub use causes::{Causes, Share};
+pub use power_ons::BiasMoved;
 pub use whole_turns::WholeTurnsOfAxis;
 
 use std::borrow::Cow;
@@ -13,6 +15,7 @@ use mimu_core::compensation::Affine;
 use nalgebra::{Matrix3, Vector3};
 use serde::Serialize;
 
+use self::power_ons::{Taken, with_one_bias};
 use crate::calibration::Calibration;
 use crate::calibration::die_temperature::{at_one_temperature, outside};
 use crate::effects::removal::{removable, remove_within};
@@ -74,6 +77,9 @@ pub struct SensorVerification {
     /// What explains the mean square of the errors; absent if the recording does not distinguish the causes.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub causes: Option<Causes>,
+    /// The biases of other power-ons within the recording, which no other figure contains; absent without any.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub bias_moved: Vec<BiasMoved>,
 }
 
 /// Result of verifying a calibration by a recording: `mimu-verify/1`.
@@ -117,12 +123,13 @@ pub fn verify(prepared: &Prepared, calibration: &Calibration) -> Result<Verifica
     verify_since(prepared, calibration, PowerOn::Another)
 }
 
-/// Whether a recording that judges a calibration was made after another power-on than the calibration.
+/// Whether a recording that judges a calibration was made after another power-on than the calibration. Where it names restarts, each power-on has its own
+/// biases, which are taken off and reported ([`SensorVerification::bias_moved`]).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PowerOn {
-    /// The unit was switched off in between, which changes its biases.
+    /// The unit was switched off in between, which changes its biases. Those of the last power-on are judged.
     Another,
-    /// It was not: its biases wander by their noise alone.
+    /// It was not, before the first restart that the recording names: its biases wander by their noise alone.
     Same,
 }
 
@@ -138,7 +145,7 @@ pub fn verify_since(
     let same_recording = calibration.recording.sha256.as_ref() == Some(&prepared.condensed.sha256);
     let mut warnings = warnings_before(prepared, calibration, same_recording)?;
     refuse_effects_of_means(prepared, calibration)?;
-    let readings = Readings::of(prepared, calibration, &mut warnings)?;
+    let readings = Readings::of(prepared, calibration, power_on, &mut warnings)?;
     let mut sensors = PerSensor::<Option<SensorVerification>>::default();
     for sensor in Sensor::BOTH {
         if calibration.inverse(sensor).is_some() && readings.as_read.has(sensor) {
@@ -150,6 +157,15 @@ pub fn verify_since(
     }
     let (whole_turns, of_turns) = whole_turns::verify(&readings.as_read, calibration);
     warnings.extend(of_turns);
+    for (sensor, found) in sensors.present() {
+        let moved = found.bias_moved.iter();
+        warnings.extend(moved.map(|of| Warning::BiasMoved {
+            sensor,
+            t_s: of.t_s,
+            moved: of.moved,
+            half_width: of.half_width,
+        }));
+    }
     let at_rest = sensors.present().filter_map(|(_, s)| s.static_rms);
     warnings.extend(at_rest.filter_map(restless));
     let worse = sensors.present();
@@ -202,14 +218,18 @@ struct Readings<'a> {
     as_read: Cow<'a, Prepared>,
     /// Without the effects, if it has any.
     without_effects: Option<Prepared>,
+    /// What the biases of other power-ons took.
+    taken: PerSensor<Taken>,
 }
 
 impl<'a> Readings<'a> {
     fn of(
         prepared: &'a Prepared,
         calibration: &Calibration,
+        power_on: PowerOn,
         warnings: &mut Vec<Warning>,
     ) -> Result<Self> {
+        let mut taken = PerSensor::default();
         let cleaned = without_effects(prepared, calibration)?;
         let curves = calibration.curves();
         let at_one = |p: &Prepared| at_one_temperature(p, calibration, curves.as_ref()?);
@@ -239,11 +259,20 @@ impl<'a> Readings<'a> {
                 }
                 cleaned = of_effects.map(|(other, _)| other).or(cleaned);
             }
-            Reference::Gravity => {}
+            Reference::Gravity => {
+                let with_one_bias = |p: &Prepared| with_one_bias(p, calibration, power_on);
+                if let Some((moved, of_moved)) = with_one_bias(&as_read) {
+                    (as_read, taken) = (Cow::Owned(moved), of_moved);
+                }
+                if let Some((moved, of_moved)) = cleaned.as_ref().and_then(with_one_bias) {
+                    (cleaned, taken) = (Some(moved), of_moved);
+                }
+            }
         }
         Ok(Self {
             as_read,
             without_effects: cleaned,
+            taken,
         })
     }
 
@@ -259,9 +288,11 @@ impl<'a> Readings<'a> {
         if !observations.is_empty() {
             refuse_wrong_gravity(&self.as_read, sensor, &observations)?;
         }
-        let affine = judge(&self.as_read, calibration, sensor, power_on);
+        let taken = &self.taken[sensor];
+        let judge = |p: &Prepared| judge(p, calibration, sensor, (power_on, taken));
+        let affine = judge(&self.as_read);
         let cleaned = self.without_effects.as_ref();
-        let with_effects = cleaned.and_then(|c| judge(c, calibration, sensor, power_on));
+        let with_effects = cleaned.and_then(judge);
         let (judged, refused) = match (affine, with_effects) {
             // Without a calibration, the readings count as the unit gave them.
             (Some((affine, _)), Some((clean, refused))) => {
@@ -367,7 +398,7 @@ fn judge(
     prepared: &Prepared,
     calibration: &Calibration,
     sensor: Sensor,
-    power_on: PowerOn,
+    (power_on, taken): (PowerOn, &Taken),
 ) -> Option<(SensorVerification, Vec<Warning>)> {
     let inverse = calibration.inverse(sensor)?;
     let mut warnings = Vec::new();
@@ -388,8 +419,14 @@ fn judge(
     let causes = causes::of(prepared, sensor, &inverse, accel.as_ref());
     let announced = |of| causes::announced(prepared, sensor, calibration, of);
     let judged = SensorVerification {
-        test: judged::test(prepared, sensor, calibration, (power_on, causes.as_ref())),
+        test: judged::test(
+            prepared,
+            sensor,
+            calibration,
+            (power_on, taken.dof, causes.as_ref()),
+        ),
         causes,
+        bias_moved: taken.moved.clone(),
         parameter_uncertainty: announced(&|s| calibration.uncertainty(s)),
         next_power_on: announced(&|s| calibration.next_power_on(s)),
         ..judged
@@ -451,6 +488,7 @@ fn judged(
         test: None,
         static_rms: None,
         causes: None,
+        bias_moved: Vec::new(),
         count: floor.len(),
     })
 }

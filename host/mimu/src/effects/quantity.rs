@@ -5,6 +5,7 @@ use nalgebra::Vector3;
 use crate::quantity::AXES;
 use crate::quantity::Sensor;
 use crate::signal::blocks::Moments;
+use mimu_recording::units::STANDARD_GRAVITY;
 
 /// Temperature from which temperature offsets count, °C.
 pub const REFERENCE_C: f64 = 25.0;
@@ -298,7 +299,7 @@ impl Quantity {
     /// Factor from SI to the unit that people read, and that unit.
     pub fn readable(self, sensor: Sensor) -> (f64, &'static str) {
         const DPS: (f64, &str) = (180.0 / std::f64::consts::PI, "deg/s");
-        const IN_G: (f64, &str) = (1.0 / 9.80665, "g");
+        const IN_G: (f64, &str) = (1.0 / STANDARD_GRAVITY, "g");
         match (self, sensor) {
             (Self::Time | Self::SessionTime | Self::RecordingTime, _) => (1.0 / 60.0, "min"),
             (Self::Rate(_) | Self::RateMagnitude, _) => DPS,

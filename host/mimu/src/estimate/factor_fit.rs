@@ -12,6 +12,7 @@ use crate::factor::{Factors, Linearized, ParameterBlock, Values};
 use crate::observable::Observable;
 use crate::observation::from_centre;
 use crate::quantity::Sensor;
+use crate::signal::power_ons::PowerOns;
 use crate::triad::{Covariance, Part, Triad, vector};
 
 /// How a fit moves a block: its values are `about + by * p`, for parameters p of order one.
@@ -64,6 +65,13 @@ impl Coordinates {
             linear: false,
             ..self
         }
+    }
+
+    /// Of a triad that is known without error.
+    pub fn fixed(sensor: Sensor, known: &Affine<f64>) -> Self {
+        let about = vector(&known.matrix, &known.offset);
+        let about = DVector::from_column_slice(about.as_slice());
+        Self::linear(ParameterBlock::Triad(sensor), about, DMatrix::zeros(12, 0))
     }
 
     /// Of a block of numbers around zero.
@@ -370,6 +378,24 @@ impl Solved<'_> {
             }
             Some((group.observable?, scatter))
         })
+    }
+
+    /// By what the bias o of a triad differs in the other power-ons, and the standard deviation, SI; zeros for a power-on without factors.
+    pub fn bias_steps(&self, sensor: Sensor, power_ons: &PowerOns) -> Vec<[Vector3<f64>; 2]> {
+        let step = |number| {
+            let block = ParameterBlock::BiasStep(sensor, number);
+            let range = self.values.range(block)?;
+            let change = self.change(block);
+            let covariance = &change * &self.covariance * change.transpose();
+            let sigma = |k: usize, _| covariance[(k, k)].sqrt();
+            Some([
+                self.values.all.fixed_rows::<3>(range.start).into_owned(),
+                Vector3::from_fn(sigma),
+            ])
+        };
+        let each = (1..=power_ons.others()).map(step);
+        each.map(|step| step.unwrap_or_else(|| [Vector3::zeros(); 2]))
+            .collect()
     }
 
     /// The triad with these parts of its covariance.

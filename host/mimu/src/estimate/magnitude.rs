@@ -178,7 +178,7 @@ pub fn by_gravity(
     estimate(observations, variances, &known)
 }
 
-/// By what the accelerometer's bias differs in the power-ons before the last, m/s²: as many as [`PowerOns::others`], from the latest to the earliest.
+/// By what the accelerometer's bias differs in the other power-ons, m/s²: as many as [`PowerOns::others`].
 ///
 /// # Errors
 /// As those of [`by_gravity`].
@@ -196,15 +196,8 @@ pub fn bias_steps(
     refuse_too_little(observations, &known)?;
     let by = ByMagnitudes::of(observations, variances, &known)?;
     let solved = by.fit.solve(by.solved()?, &|_, _| 0.0, &|_| Ok(()))?;
-    let step = |k| {
-        let range = solved
-            .values
-            .range(ParameterBlock::BiasStep(Sensor::Accel, k));
-        range.map_or_else(Vector3::zeros, |of| {
-            solved.values.all.fixed_rows::<3>(of.start).into_owned()
-        })
-    };
-    Ok((1..=power_ons.others()).map(step).collect())
+    let steps = solved.bias_steps(known.sensor, power_ons);
+    Ok(steps.into_iter().map(|[step, _]| step).collect())
 }
 
 /// Refuses experiments that cannot determine the nine parameters, whatever the noise.

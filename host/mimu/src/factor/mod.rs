@@ -32,7 +32,7 @@ pub enum ParameterBlock {
     LevelRate(usize),
     /// Relative error of a magnitude that is given, such as the rate of a turntable.
     GivenMagnitude(usize),
-    /// By what the bias o of a power-on differs from that of the last one, SI: of a triad, and by so many power-ons before the last.
+    /// By what the bias o of a power-on differs from that of the triad, SI: of which triad, and the number of the power-on.
     BiasStep(Sensor, usize),
 }
 
@@ -284,7 +284,7 @@ impl<'a> Factors<'a> {
     pub fn bias_steps(&mut self, sensor: Sensor, power_ons: &PowerOns) -> Vec<ParameterBlock> {
         self.power_ons.clone_from(power_ons);
         let dwells = self.list.iter().filter_map(|factor| factor.dwells);
-        let seen: Vec<usize> = dwells.map(|of| power_ons.later(of[0])).collect();
+        let seen: Vec<usize> = dwells.map(|of| power_ons.number(of[0])).collect();
         let steps = (1..=power_ons.others()).filter(|step| seen.contains(step));
         let blocks: Vec<_> = steps
             .map(|step| ParameterBlock::BiasStep(sensor, step))
@@ -446,7 +446,9 @@ impl<'a> State<'a> {
 
     fn evaluate(&self, factors: &Factors, factor: &Factor, rows: &mut Rows) {
         let model = |sensor| rows.values.triad(sensor).unwrap_or_else(Affine::identity);
-        let step = factor.dwells.map_or(0, |of| factors.power_ons.later(of[0]));
+        let step = factor
+            .dwells
+            .map_or(0, |of| factors.power_ons.number(of[0]));
         match &factor.kind {
             Kind::Magnitude {
                 sensor,

@@ -15,9 +15,8 @@ use crate::estimate::Observation;
 use crate::prepared::Prepared;
 use crate::quantity::Sensor;
 use crate::signal::dwell::Dwell;
-use crate::triad::NORMAL_95;
 use crate::warning::Warning;
-use mimu_recording::Reference;
+use mimu_recording::{NORMAL_95, Reference};
 
 /// Standard deviation of the arm of an axis, m: as much as a large fixture has, so that the rates alone determine it.
 const SIGMA_M: f64 = 0.1;

@@ -12,9 +12,9 @@ use crate::estimate::{Estimated, Observation, known_input};
 use crate::prepared::Prepared;
 use crate::quantity::Sensor;
 use crate::signal::dwell::Dwell;
-use crate::triad::{Covariance, NORMAL_95, Part, Triad, vector};
+use crate::triad::{Covariance, Part, Triad, vector};
 use mimu_recording::error::{Error, Result};
-use mimu_recording::{Reference, ReferenceError};
+use mimu_recording::{NORMAL_95, Reference, ReferenceError};
 
 /// What errs in the reference.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]

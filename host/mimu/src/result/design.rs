@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::TOOL;
 use crate::plan::design::Problem;
 use crate::plan::design::budget::{Budget, DwellNoise, Spending};
-use crate::plan::design::judgement::{HALF_95, Judgement};
+use crate::plan::design::judgement::Judgement;
 use crate::plan::design::model::{Setting, Term};
 use crate::plan::design::reach::Fixture;
 use crate::plan::design::schemes::{FANG_FILTERS, Scheme};
@@ -17,7 +17,7 @@ use crate::plan::design::tour::{Motion, Order};
 use crate::plan::{Plan, Step};
 use crate::quantity::{Sensor, minutes, significant};
 use beside_population::BesidePopulation;
-use mimu_recording::Reference;
+use mimu_recording::{NORMAL_95, Reference};
 
 /// Sample rate of the recording that a plan asks for, Hz.
 const SAMPLE_RATE_HZ: f64 = 1000.0;
@@ -273,8 +273,8 @@ impl Design {
         let sigma = judgement.sigma;
         let alone = problem.population().map(|_| problem.judge(&[], sigma));
         let parameters = judgement.parameters.iter().enumerate().map(|(k, p)| {
-            let half = |factor: f64| HALF_95 * p.sigma * factor;
-            let alone = alone.as_ref().map(|a| HALF_95 * a.parameters[k].sigma);
+            let half = |factor: f64| NORMAL_95 * p.sigma * factor;
+            let alone = alone.as_ref().map(|a| NORMAL_95 * a.parameters[k].sigma);
             ParameterSigma {
                 name: p.parameter.name.clone(),
                 value: p.sigma * p.parameter.si,

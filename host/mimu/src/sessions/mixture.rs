@@ -105,7 +105,7 @@ fn quantile(dof: f64, p: f64) -> f64 {
     match dof < NORMAL_DOF {
         true => StudentsT::new(0.0, 1.0, dof).map_or(f64::NAN, |t| t.inverse_cdf(p)),
         false if p == 0.75 => PROBABLE_ERROR,
-        false => crate::triad::NORMAL_95,
+        false => mimu_recording::NORMAL_95,
     }
 }
 

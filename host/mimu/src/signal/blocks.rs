@@ -136,7 +136,7 @@ pub struct Condensed {
 
 impl Condensed {
     /// Adds to the gyro's readings between two instants, raw.
-    pub(crate) fn add_to_gyro(&mut self, added: &Vector3<f64>, from_s: f64, to_s: f64) {
+    pub(crate) fn add_to_gyro(&mut self, added: &Vector3<f64>, [from_s, to_s]: [f64; 2]) {
         let own = self.blocks.iter_mut();
         for block in own.filter(|b| from_s <= b.start_s && b.start_s < to_s) {
             // Extremes keep their values: they decide on rails, which are those of the recorded reading.

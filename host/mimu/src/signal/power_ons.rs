@@ -11,41 +11,80 @@ use mimu_recording::error::Result;
 /// To which power-on the dwells of a recording belong.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct PowerOns {
-    /// Of each dwell: so many power-ons with dwells come later. Empty if there is one.
-    later: Vec<usize>,
+    /// The times between restarts; empty if there is one.
+    spans: Vec<Span>,
+    /// Of each dwell: the number of its power-on, 0 for the one whose biases are those of the triads. Empty if there is one.
+    number: Vec<usize>,
+}
+
+/// A time between restarts.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Span {
+    /// From the first sample after a restart to the next restart, s.
+    pub between_s: [f64; 2],
+    /// What was added to the readings of the gyro, raw.
+    pub gyro: Vector3<f64>,
 }
 
 impl PowerOns {
     /// A recording of one power-on.
-    pub const ONE: &Self = &Self { later: Vec::new() };
+    pub const ONE: &Self = &Self {
+        spans: Vec::new(),
+        number: Vec::new(),
+    };
 
-    /// By the restarts in the manifest.
-    pub fn of(dwells: &[Dwell], manifest: &Manifest) -> Self {
-        let times = restarts(manifest);
-        let of = |dwell: &Dwell| times.iter().filter(|t| **t <= dwell.start_s).count();
-        let mut later = Vec::new();
-        for pair in dwells.windows(2).rev() {
-            let after = later.last().copied().unwrap_or(0);
-            if later.is_empty() {
-                later.push(0);
-            }
-            later.push(after + usize::from(of(&pair[0]) != of(&pair[1])));
-        }
-        later.reverse();
-        match later.first() {
-            Some(0) | None => Self::default(),
-            Some(_) => Self { later },
+    /// Of dwells in these times. The triads have the biases of the last.
+    pub(crate) fn of(dwells: &[Dwell], spans: Vec<Span>) -> Self {
+        let span = |dwell: &Dwell| spans.partition_point(|s| s.between_s[1] <= dwell.start_s);
+        let own: Vec<usize> = dwells.iter().map(span).collect();
+        let mut with_dwells = own.clone();
+        with_dwells.dedup();
+        let later = |span: &usize| with_dwells.iter().filter(|other| *other > span).count();
+        Self {
+            number: match spans.is_empty() {
+                true => Vec::new(),
+                false => own.iter().map(later).collect(),
+            },
+            spans,
         }
     }
 
-    /// How many power-ons with dwells come after that of this dwell: 0 for the last one.
-    pub fn later(&self, dwell: usize) -> usize {
-        self.later.get(dwell).copied().unwrap_or(0)
+    /// The same for triads whose biases are those before the first restart, whether there are dwells before it or not.
+    pub(crate) fn since(&self, dwells: &[Dwell]) -> Self {
+        let first = self.spans.first().zip(dwells.first());
+        let before = first.is_some_and(|(span, dwell)| span.between_s[1] <= dwell.start_s);
+        let from = self
+            .number
+            .first()
+            .map_or(0, |most| most + usize::from(before));
+        Self {
+            spans: self.spans.clone(),
+            number: self.number.iter().map(|later| from - later).collect(),
+        }
     }
 
-    /// Number of power-ons before the last one.
+    /// Number of the power-on of this dwell: 0 for the one whose biases are those of the triads.
+    pub fn number(&self, dwell: usize) -> usize {
+        self.number.get(dwell).copied().unwrap_or(0)
+    }
+
+    /// Number of power-ons with other biases.
     pub fn others(&self) -> usize {
-        self.later(0)
+        self.number.iter().copied().max().unwrap_or(0)
+    }
+
+    /// The times between restarts; empty if there is one.
+    pub(crate) fn spans(&self) -> &[Span] {
+        &self.spans
+    }
+
+    /// When the power-on with this number was, s, and its end. `None` without a dwell in it.
+    pub(crate) fn between_s(&self, dwells: &[Dwell], number: usize) -> Option<[f64; 2]> {
+        let dwell = self.number.iter().position(|n| *n == number)?;
+        let start_s = dwells[dwell].start_s;
+        let own = self.spans.iter().map(|span| span.between_s);
+        own.into_iter()
+            .find(|[from_s, to_s]| (*from_s..*to_s).contains(&start_s))
     }
 }
 
@@ -55,25 +94,22 @@ fn restarts(manifest: &Manifest) -> Vec<f64> {
     recorded.map(|restart| restart.t_s).collect()
 }
 
-/// `condensed` with the gyro's readings before the last power-on moved by what their biases differ from the last, raw: otherwise dwells of one power-on seem
-/// to turn beside those of another. `find` finds the dwells of one power-on. A few degrees an hour of the Earth's rate do not matter here: the fit
-/// finds the rest.
+/// `condensed` with the gyro's readings before the last power-on moved by what their biases differ from the last, raw, and the times between restarts:
+/// otherwise dwells of one power-on seem to turn beside those of another. `find` finds the dwells of one power-on. A few degrees an hour of the Earth's
+/// rate do not matter here: the fit finds the rest.
 pub(crate) fn with_one_bias(
     mut condensed: Condensed,
     manifest: &Manifest,
     find: impl Fn(&Condensed) -> Result<Dwells>,
-) -> Condensed {
+) -> (Condensed, Vec<Span>) {
     let times = restarts(manifest);
     if times.is_empty() {
-        return condensed;
+        return (condensed, Vec::new());
     }
     let edges = std::iter::once(f64::NEG_INFINITY).chain(times.iter().copied());
-    let spans: Vec<[f64; 2]> = edges
-        .zip(times.iter().copied().chain([f64::INFINITY]))
-        .map(|(from, to)| [from, to])
-        .collect();
-    let bias = |[from, to]: &[f64; 2]| {
-        let dwells = find(&condensed.between(*from, *to)).ok()?.list;
+    let spans = edges.zip(times.iter().copied().chain([f64::INFINITY]));
+    let bias = |[from, to]: [f64; 2]| {
+        let dwells = find(&condensed.between(from, to)).ok()?.list;
         let middle = |c: usize| {
             let rests = dwells.iter().filter(|d| d.faults.gyro.is_none() && !d.turn);
             let mut means: Vec<f64> = rests.map(|d| d.raw[c].mean).collect();
@@ -83,13 +119,19 @@ pub(crate) fn with_one_bias(
         let [x, y, z] = [0, 1, 2].map(|k| middle(gyro + k));
         Some(Vector3::new(x?, y?, z?))
     };
-    let biases: Vec<Option<Vector3<f64>>> = spans.iter().map(bias).collect();
-    if let Some(last) = biases.iter().rev().flatten().next() {
-        for ([from, to], bias) in spans.iter().zip(&biases) {
-            if let Some(bias) = bias {
-                condensed.add_to_gyro(&(last - bias), *from, *to);
-            }
-        }
+    let biases: Vec<_> = spans
+        .map(|(from, to)| ([from, to], bias([from, to])))
+        .collect();
+    let last = biases.iter().rev().find_map(|(_, bias)| *bias);
+    let moved = biases.into_iter().map(|(between_s, bias)| Span {
+        between_s,
+        gyro: last
+            .zip(bias)
+            .map_or_else(Vector3::zeros, |(last, bias)| last - bias),
+    });
+    let spans: Vec<Span> = moved.collect();
+    for span in &spans {
+        condensed.add_to_gyro(&span.gyro, span.between_s);
     }
-    condensed
+    (condensed, spans)
 }

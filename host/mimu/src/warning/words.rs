@@ -6,7 +6,7 @@ use mimu_recording::RAW_COLUMNS;
 use mimu_recording::error::Error;
 
 use crate::fault::{Fault, SHORTEST_S};
-use crate::quantity::{Sensor, duration, normal_gravity, plural, significant};
+use crate::quantity::{Figure, Sensor, duration, normal_gravity, plural, significant};
 
 /// How uncertain `parameter` would be without a dwell or a turn.
 pub(super) fn open(parameter: &str, grows: f64) -> String {
@@ -51,6 +51,27 @@ pub(super) fn vector(values: &[f64; 3], halves: &[f64; 3]) -> String {
 
 pub(super) fn degrees(rad: f64) -> String {
     significant(rad.abs().to_degrees())
+}
+
+pub(super) fn bias_moved(
+    sensor: &Sensor,
+    t_s: &f64,
+    moved: &[f64; 3],
+    half_width: &[f64; 3],
+    f: &mut fmt::Formatter,
+) -> fmt::Result {
+    let (factor, unit) = Figure::Input.readable(*sensor);
+    let written = |si: &[f64; 3]| si.map(|v| significant(v * factor)).join(", ");
+    let begun = match t_s.is_finite() {
+        true => format!("from the restart at {t_s:.1} s on"),
+        false => "before the first restart".into(),
+    };
+    write!(
+        f,
+        "{sensor}: {begun}, the bias is more by {} {unit} (to {}): this is not judged",
+        written(moved),
+        written(half_width)
+    )
 }
 
 pub(super) fn repeated(rows: &u64, f: &mut fmt::Formatter) -> fmt::Result {

@@ -6,6 +6,7 @@ use std::time::Instant;
 
 use mimu::quantity::{normal_gravity, plural};
 use mimu_recording::error::{Error, Result};
+use mimu_recording::units::STANDARD_GRAVITY;
 use mimu_recording::{UNNAMED, are_two_units};
 use mimu_station::boards::Boards;
 use mimu_station::gather::{Samples, Take};
@@ -24,7 +25,7 @@ const HANDS_OFF_S: f64 = 1.0;
 /// Standard uncertainty of gravity by latitude, m/s²: 300 m of height, or an anomaly of 100 mGal.
 const BY_LATITUDE: f64 = 1e-3;
 /// The same where nothing is said of the place: 9.780 to 9.832 m/s², all equally likely.
-const ANYWHERE: [f64; 2] = [9.80665, 0.015];
+const ANYWHERE: [f64; 2] = [STANDARD_GRAVITY, 0.015];
 /// Least share of the requested length that a recording has.
 const LEAST_SHARE: f64 = 0.95;
 /// Sides of a measurement with three sides up.

@@ -70,9 +70,8 @@ pub enum Act {
     Vanish,
     /// The device is without power for `away_ms` while its port stays, as behind an ST-LINK. Then it starts, and its greeting is lost.
     PowerCut { away_ms: u64 },
-    /// The cable is pulled, and plugged in again after `away_ms`: a different port of the same name. The device continues meanwhile, or starts then
-    /// if the cable is its only power.
-    Unplug { away_ms: u64, powered: bool },
+    /// The cable is pulled, and plugged in again after `away_ms`: a different port of the same name. The device continues meanwhile.
+    Unplug { away_ms: u64 },
 }
 
 /// Behaviour at the port.
@@ -244,8 +243,8 @@ fn open(link: Option<&Path>) -> (Terminal, String) {
 
 struct Device {
     port: Option<Terminal>,
-    /// When the port returns, and whether the device has power until then.
-    back: Option<(Instant, bool)>,
+    /// When the port returns.
+    back: Option<Instant>,
     /// Until when it is without power.
     off_until: Option<Instant>,
     seen: Arc<Mutex<Seen>>,
@@ -272,11 +271,8 @@ impl Device {
         let mut decoder = Decoder::new();
         let mut bytes = [0; 4096];
         while !self.stop.load(Ordering::Relaxed) {
-            if let Some((_, powered)) = self.back.take_if(|back| back.0 <= Instant::now()) {
+            if self.back.take_if(|back| *back <= Instant::now()).is_some() {
                 self.port = Some(open(self.script.link.as_deref()).0);
-                if !powered {
-                    self.restart();
-                }
             }
             let count = match &mut self.port {
                 Some(port) => port.read(&mut bytes),

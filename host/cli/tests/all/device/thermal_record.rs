@@ -5,10 +5,10 @@ use std::net::{TcpListener, TcpStream};
 use std::sync::{Arc, Mutex};
 
 use mimu_core::wire::Start;
-use mimu_recording::{Manifest, Recording, Reference};
+use mimu_recording::Manifest;
 
 use super::peer::{Act, Peer, Script};
-use super::{Place, mimu, start};
+use super::{Place, mimu};
 
 /// A table with a chamber behind a TCP address; it reports busy for two queries after each motion.
 struct Equipment {
@@ -75,8 +75,6 @@ fn plan(place: &Place, steps: &str) {
     std::fs::write(place.path("plan.toml"), format!("{head}{steps}")).unwrap();
 }
 
-const UP: &str = "[[step]]\nup = [0.0, 0.0, 1.0]\n";
-
 fn arguments<'a>(peer: &'a Peer, name: &'a str) -> Vec<&'a str> {
     let words = "thermal record plan.toml --driver driver.toml --json - --port";
     let mut all: Vec<&str> = words.split(' ').collect();
@@ -90,96 +88,6 @@ fn quick() -> Script {
         start: Start::PowerOn,
         ..Script::default()
     }
-}
-
-#[test]
-fn dwells_and_turns_are_recorded_with_their_inputs_and_the_chamber_is_left_at_rest() {
-    let place = Place::new();
-    let (equipment, peer) = (Equipment::new(&place), Peer::new(quick()));
-    let turn = "[[step]]\nturn_axis = \"inner\"\nturn_deg = 90.0\nturn_dps = 45.0\n";
-    plan(
-        &place,
-        &format!("rounds = 2\n{UP}dwell_s = 2.0\n{turn}[[step]]\nstay = true\ndwell_s = 1.0\n"),
-    );
-    let ran = mimu(&place, &arguments(&peer, "rec"));
-    let made = ran.json();
-    assert_eq!(made["dwells_done"], 6, "{}", ran.stderr);
-    assert!(ran.stderr.contains("round 2 of 2"), "{}", ran.stderr);
-    let told = equipment.told();
-    let motions: Vec<&str> = told
-        .iter()
-        .map(String::as_str)
-        .filter(|l| !l.starts_with("CHAMBER"))
-        .collect();
-    let turn = "TURN inner 90.000000 45.000000";
-    let pose = "MOVE 0.000000 0.000000 1.000000";
-    assert_eq!(
-        motions,
-        ["STOP", pose, turn, turn, "STOP"],
-        "where it stands already, it is not sent"
-    );
-    let sets: Vec<f64> = told
-        .iter()
-        .filter_map(|l| l.strip_prefix("CHAMBER ")?.parse().ok())
-        .collect();
-    assert_eq!((sets[0], sets[sets.len() - 1]), (21.0, 25.0));
-    assert_eq!(
-        made["set_points"].as_u64().unwrap() as usize,
-        sets.len() - 1
-    );
-
-    let manifest = Manifest::read(&place.path("rec/recording.toml")).unwrap();
-    assert_eq!(manifest.reference, Reference::Table);
-    assert_eq!(manifest.turn_steps, [1, 4]);
-    assert!(manifest.dropped_steps.is_empty() && !manifest.unfinished);
-    let mut samples = [0.0; 6];
-    let mut turned = [0.0; 6];
-    let recording = Recording::open(&place.path("rec")).unwrap();
-    let read = recording.for_each_batch(
-        |_| {},
-        |batch| {
-            for (row, step) in batch.step.iter().enumerate() {
-                let input = [2, 5].map(|i: usize| batch.reference[i][row]);
-                match step {
-                    -1 => assert!(input.iter().all(|x| x.is_nan())),
-                    1 | 4 => assert!(input[1].is_nan()),
-                    _ => assert_eq!(input, [0.0, 9.8]),
-                }
-                if let Ok(step) = usize::try_from(*step) {
-                    samples[step] += 1.0;
-                    turned[step] += input[0] / 1000.0;
-                }
-            }
-            Ok(())
-        },
-    );
-    read.unwrap();
-    for (step, length) in [(0, 2000.0), (2, 1000.0), (3, 2000.0), (5, 1000.0)] {
-        assert!(
-            (0.0..100.0).contains(&(samples[step] - length)),
-            "{samples:?}"
-        );
-    }
-    for step in [1, 4] {
-        assert!((turned[step] - 90.0_f64).abs() < 1e-6, "{turned:?}");
-    }
-}
-
-#[test]
-fn a_device_that_loses_its_power_ends_it_and_what_stands_is_kept() {
-    let place = Place::new();
-    let acts = vec![(6_000, Act::Restart)];
-    let (equipment, peer) = (
-        Equipment::new(&place),
-        Peer::new(Script { acts, ..quick() }),
-    );
-    plan(&place, &format!("{UP}dwell_s = 600.0\n"));
-    let ran = mimu(&place, &arguments(&peer, "rec"));
-    ran.refused(&["a recording has one power-on", "0 of 1 dwells"]);
-    let told = equipment.told();
-    assert_eq!(told[told.len() - 2..], ["STOP", "CHAMBER 25.000000"]);
-    let manifest = Manifest::read(&place.path("rec/recording.toml")).unwrap();
-    assert!(!manifest.unfinished && manifest.recorded.unwrap().restarts.is_empty());
 }
 
 #[test]
@@ -217,29 +125,4 @@ fn a_pose_that_the_unit_does_not_have_ends_it_and_the_dwell_does_not_count() {
     assert_eq!(equipment.told().last().unwrap(), "CHAMBER 25.000000");
     let manifest = Manifest::read(&place.path("rec/recording.toml")).unwrap();
     assert_eq!(manifest.dropped_steps, [0]);
-}
-
-#[test]
-fn an_interrupted_procedure_is_a_recording_that_says_it_is_cut_short() {
-    let place = Place::new();
-    let (equipment, peer) = (Equipment::new(&place), Peer::new(quick()));
-    plan(&place, &format!("{UP}dwell_s = 600.0\n"));
-    let mut child = start(&place, &arguments(&peer, "rec"));
-    while equipment.told().len() < 5 {
-        assert!(child.try_wait().unwrap().is_none(), "it has ended");
-        std::thread::sleep(std::time::Duration::from_millis(20));
-    }
-    let id = rustix::process::Pid::from_child(&child);
-    rustix::process::kill_process(id, rustix::process::Signal::INT).unwrap();
-    let out = child.wait_with_output().unwrap();
-    let told = String::from_utf8_lossy(&out.stderr);
-    assert_eq!(out.status.code(), Some(1), "{told}");
-    assert!(
-        told.contains("it was interrupted and is incomplete"),
-        "{told}"
-    );
-    let all = equipment.told();
-    assert_eq!(all[all.len() - 2..], ["STOP", "CHAMBER 25.000000"]);
-    let manifest = Manifest::read(&place.path("rec/recording.toml")).unwrap();
-    assert!(!manifest.unfinished && manifest.dropped_steps.is_empty());
 }

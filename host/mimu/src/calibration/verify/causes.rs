@@ -235,7 +235,7 @@ pub(super) fn announced(
 }
 
 /// The covariance of d and A instead of C and o.
-fn of_errors(
+pub(super) fn of_errors(
     model: &Affine<f64>,
     (covariance, sigmas): (Covariance, f64),
 ) -> Option<(Covariance, f64)> {

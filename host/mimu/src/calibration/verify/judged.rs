@@ -14,7 +14,7 @@ use crate::judge::input;
 use crate::judgement::{Judgement, JudgementKind};
 use crate::observation::vector;
 use crate::prepared::{Prepared, si_covariance};
-use crate::quantity::{Figure, Sensor};
+use crate::quantity::{Figure, Sensor, plural};
 use crate::recording_problem::RecordingProblem;
 use crate::sessions::class::PartClass;
 use crate::triad::{Covariance, Forward};
@@ -80,20 +80,29 @@ fn figures(
         input: input_size(prepared, sensor, s.figure),
         test: s.test,
         cause: s.causes.as_ref().map(Causes::words),
-        too_few: None,
+        too_few: (!s.bias_moved.is_empty()).then(|| {
+            let restarts = plural(s.bias_moved.len() as u64, "other power-on");
+            format!("the biases of {restarts} leave too few errors to judge by: record more poses")
+        }),
     }
 }
 
 /// How the errors of `sensor` in this recording compare with the noise and with what the calibration's parameters are known to err by. `None` if the noise is
-/// unknown, or if nothing judges the sensor. A change of the biases is tested by itself too: three numbers show little among the errors of many dwells.
+/// unknown, or if nothing judges the sensor. A change of the biases is tested by itself too: three numbers show little among the errors of many dwells. `taken`: degrees
+/// of freedom that the biases of other power-ons took.
 pub(super) fn test(
     prepared: &Prepared,
     sensor: Sensor,
     calibration: &Calibration,
-    (power_on, causes): (PowerOn, Option<&Causes>),
+    (power_on, taken, causes): (PowerOn, f64, Option<&Causes>),
 ) -> Option<Test> {
     let covariance = covariance(prepared, sensor, calibration, power_on);
-    let of_errors = of_errors(prepared, sensor, calibration, (power_on, &covariance))?;
+    let of_errors = of_errors(
+        prepared,
+        sensor,
+        calibration,
+        (power_on, taken, &covariance),
+    )?;
     // Within a power-on the errors have all that the noise predicts of the biases already.
     let causes = causes.filter(|_| power_on == PowerOn::Another);
     let of_biases = causes.and_then(|causes| of_biases(causes, &covariance));
@@ -124,7 +133,7 @@ fn of_errors(
     prepared: &Prepared,
     sensor: Sensor,
     calibration: &Calibration,
-    (power_on, covariance): (PowerOn, &Covariance),
+    (power_on, taken, covariance): (PowerOn, f64, &Covariance),
 ) -> Option<Test> {
     let model = calibration.inverse(sensor)?;
     let known = |s: &Sensor| prepared.noise.is_known(*s);
@@ -163,7 +172,7 @@ fn of_errors(
             predicted::directions(&prepared.turns(&accel).0, [&model, &accel], &both)
         }
     };
-    Test::of(&[unseen], (f64::INFINITY, 0.0))
+    Test::of(&[unseen], (f64::INFINITY, 0.0), taken)
 }
 
 /// Covariance of C by rows, then o, of `sensor` in this recording: what noise gives, and how biases change between sessions.

@@ -1,8 +1,9 @@
 //! Half-widths that a design predicts, and the fewest dwells that suffice.
 
-use super::judgement::{Determined, HALF_95, Judgement};
+use super::judgement::{Determined, Judgement};
 use super::problem::Problem;
 use crate::observation::{LOWER, place};
+use mimu_recording::NORMAL_95;
 
 /// Largest half-widths of 95 % intervals, if the noise is known, by kind of parameter. Infinite if one is not determined.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -35,7 +36,7 @@ impl Widths {
                 (i, Some(j)) if i == j => &mut widths.scale,
                 _ => &mut widths.angle,
             };
-            *kind = kind.max(HALF_95 * sigma * parameter.si);
+            *kind = kind.max(NORMAL_95 * sigma * parameter.si);
         }
         widths
     }

@@ -8,9 +8,6 @@ use super::problem::Problem;
 use super::refinement::Region as _;
 use crate::estimate::least_squares::Observability;
 
-/// Half of a 95 % interval in sigmas, where the noise of a dwell mean is known.
-pub const HALF_95: f64 = 1.959_963_984_540_054;
-
 /// A parameter as a design determines it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Determined {

@@ -13,7 +13,7 @@ use mimu_recording::Reference;
 
 /// Standard gravity, m/s²: magnitude of the specific force at rest. Local gravity differs by parts in a
 /// thousand, which changes no design.
-pub const GRAVITY: f64 = 9.80665;
+pub const GRAVITY: f64 = readable::STANDARD_GRAVITY;
 
 /// Input of one dwell: an attitude and, on a turntable, a rate about the vertical.
 #[derive(Debug, Clone, Copy, PartialEq)]

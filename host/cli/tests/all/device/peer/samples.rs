@@ -52,13 +52,12 @@ impl Device {
                     self.off_until = Some(Instant::now() + Duration::from_millis(away_ms));
                     return;
                 }
-                Some(Act::Unplug { away_ms, powered }) => {
+                Some(Act::Unplug { away_ms }) => {
                     if let Some(link) = &self.script.link {
                         std::fs::remove_file(link).unwrap();
                     }
                     self.port = None;
-                    let back = Instant::now() + Duration::from_millis(away_ms);
-                    self.back = Some((back, powered));
+                    self.back = Some(Instant::now() + Duration::from_millis(away_ms));
                 }
                 Some(Act::Drop) => self.dropped += 1,
                 _ => {}
