@@ -84,7 +84,7 @@ no-panic:
 
 # With the libraries, so that the extension module for Python is built with the features that the tests need: no crate is compiled twice.
 build-tests:
-	$(CARGO) build --locked $(ON_PC) --all-targets
+	$(CARGO) build --locked $(ON_PC) --lib --tests --benches --examples
 	@touch $(BUILT)
 
 # Side by side: much of each is waiting.
@@ -144,7 +144,7 @@ demo: toolchain ## calibrate and verify a board on the virtual bench; SEED=n is 
 	@if [ $(BOARD) = matek ]; then $(MATEK) && cp $(IMAGES)/mimu-firmware $(IMAGES)/mimu-firmware-matek-h743; fi
 	@$(FIRMWARE)
 	@if [ -e $(BUILT) ] && [ -z "$$(find core host rig tests -name '*.rs' -newer $(BUILT) -print -quit)" ]; \
-	then $(CARGO) build --locked $(ON_PC) --all-targets; \
+	then $(CARGO) build --locked $(ON_PC) --lib --tests --benches --examples; \
 	else $(CARGO) build --locked -p mimu-cli -p mimu-board-tests --bin mimu --bin demo; fi
 	@rm -rf $(DEMO)
 	@target/debug/demo $(SEED) $(DEMO) $(BOARD)
