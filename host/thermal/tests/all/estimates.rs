@@ -61,7 +61,7 @@ fn curves_and_lag_of_a_whole_cycle_are_those_of_the_unit_as_nearly_as_they_say()
             (lag.value - lag_s).abs() < 4.0 * sigma && sigma < 4.0,
             "{lag:?}"
         );
-        let bounds = bounds(&experiment, true, &TEMPS);
+        let bounds = bounds(&experiment, &TEMPS);
         for sensor in 0..2 {
             let (mut squared, mut bound, mut normal) = (0.0, 0.0, 0.0);
             for (t, temp_c) in TEMPS.iter().enumerate() {
