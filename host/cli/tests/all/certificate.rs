@@ -1,13 +1,14 @@
 //! `mimu report --certificate`: what the page says is what the fit found and what the files state.
 
 use std::path::Path;
-use std::process::{Command, Output};
 
 use mimu_rig::located::Source;
 use mimu_rig::plan::Plan;
 use mimu_rig::record;
 use mimu_rig::rig_file::{RigFile, RigTruth};
 use serde_json::Value;
+
+use super::command::{done, mimu};
 
 const PARTICULARS: &str = r#"
 format = "mimu-particulars/1"
@@ -41,21 +42,6 @@ mounting_deg = 0.02
 level_deg = 0.01
 rectangular = ["level_deg"]
 "#;
-
-fn mimu(folder: &Path, arguments: &str) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_mimu"))
-        .current_dir(folder)
-        .args(arguments.split(' '))
-        .output()
-        .unwrap()
-}
-
-fn done(folder: &Path, arguments: &str) -> String {
-    let out = mimu(folder, arguments);
-    let said = String::from_utf8_lossy(&out.stderr);
-    assert!(out.status.success(), "mimu {arguments}: {said}");
-    String::from_utf8(out.stdout).unwrap()
-}
 
 /// A recording on the bench's table in `folder`, whose manifest says `more`.
 fn on_table(folder: &Path, name: &str, seed: u64, more: &str) {

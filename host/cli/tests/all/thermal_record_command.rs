@@ -190,6 +190,7 @@ fn recording(bench: &Bench, name: &str, bytes: u64, child: &mut Child) {
 }
 
 #[test]
+#[ignore = "nightly: the emulated board; by day `device::thermal_record` interrupts one with a scripted device"]
 fn a_procedure_that_is_interrupted_or_loses_its_power_keeps_what_it_has_and_leaves_the_chamber_safe()
  {
     let mut bench = Bench::new("table", brisk(12), 12);

@@ -52,15 +52,6 @@ fn what_can_be_left_out_is_named_and_the_result_is_right() {
             &["1 gap, 0.500 s", "data row 1897"],
         ),
         (
-            "a gap in a dwell on the table",
-            on_table,
-            |s| {
-                let from = s.dwells[4].start + 50;
-                s.rows.drain(from..from + 40);
-            },
-            &["1 gap, 0.400 s"],
-        ),
-        (
             "a gap in a turn",
             by_hand,
             |s| {
@@ -83,12 +74,6 @@ fn what_can_be_left_out_is_named_and_the_result_is_right() {
             by_hand,
             |s| column_of_dwell(s, "accel_y", &[3, 4, 9]),
             &["3 dwells (3, 4, 9)", "accel_y stuck"],
-        ),
-        (
-            "gyro stuck in dwells",
-            by_hand,
-            |s| column_of_dwell(s, "gyro_y", &[3, 4, 9]),
-            &["3 dwells (3, 4, 9)", "gyro_y stuck"],
         ),
         (
             "gyro stuck on the table",
@@ -122,15 +107,6 @@ fn what_can_be_left_out_is_named_and_the_result_is_right() {
                 s.edit("accel_z", all, |u| u.min(14000.0));
             },
             &["accel_z: the highest value 14000", "accel_z saturated"],
-        ),
-        (
-            "accelerometer clipped on the table",
-            on_table,
-            |s| {
-                let all = s.all();
-                s.edit("accel_z", all, |u| u.min(14000.0));
-            },
-            &["5 dwells (20, 21, 22, 23, 24)", "accel_z saturated"],
         ),
         (
             "half of the samples clipped",

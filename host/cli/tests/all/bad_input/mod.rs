@@ -27,12 +27,6 @@ fn what_only_its_owner_can_judge_is_a_warning() {
             &["gyro: the axes are left-handed"],
         ),
         (
-            "the same on the table",
-            on_table,
-            |s| swap(s, "gyro_x", "gyro_y"),
-            &["gyro: the axes are left-handed"],
-        ),
-        (
             "two axes of the accelerometer swapped",
             by_hand,
             |s| swap(s, "accel_x", "accel_y"),

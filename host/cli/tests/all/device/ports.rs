@@ -2,11 +2,7 @@
 
 use std::os::unix::process::CommandExt as _;
 
-use mimu_core::wire::{
-    Decoder, Greeting, MAGIC, MAX_FRAME, Message, PROTOCOL, Slot, Start, Version, WrongRegister,
-    encode,
-};
-use mimu_device::{Answer, Received, Receiver, Started};
+use mimu_core::wire::{PROTOCOL, Version, WrongRegister};
 
 use super::peer::{Behaviour, Peer, Script};
 use super::terminal::Terminal;
@@ -139,55 +135,4 @@ fn a_port_without_permission_is_told_apart() {
         return;
     }
     assert!(line.contains("no permission to open the port"), "{line}");
-}
-
-#[test]
-fn a_device_that_started_for_a_reason_of_a_later_version_is_talked_to_all_the_same() {
-    let greeting = Greeting {
-        magic: MAGIC,
-        protocol: PROTOCOL,
-        start: Start::Fault { pc: 7, cfsr: 9 },
-        starts: 5,
-        slots: [Slot::Empty; 2],
-        ..Greeting::default()
-    };
-    let mut later = payload(&Message::Greeting { id: 3, greeting });
-    // The variant, after the length of the field: 5, for a fault with two numbers of one byte each.
-    let at = later.windows(4).position(|w| w == [3, 5, 7, 9]).unwrap();
-    later[at + 1] = 42;
-    let mut heard = Vec::new();
-    let mut receiver = Receiver::default();
-    receiver.take(&framed(&later), |message| heard.push(message));
-    let [Received::Answer(3, Answer::Greeting(who))] = &heard[..] else {
-        panic!("{heard:?}");
-    };
-    assert_eq!((&who.start, who.starts), (&Started::NotKnown, 5));
-    assert!(who.warnings.is_empty(), "{:?}", who.warnings);
-}
-
-/// The message in the frame that the device would send.
-fn payload(message: &Message<'_>) -> Vec<u8> {
-    let mut frame = [0; MAX_FRAME];
-    let length = encode(message, &mut frame).unwrap();
-    let mut decoder = Decoder::new();
-    let mut frame = frame[..length].iter();
-    let payload = frame.find_map(|byte| Some(decoder.push(*byte)?.0.to_vec()));
-    payload.unwrap()
-}
-
-/// A payload with its CRC-32 in COBS, in blocks of less than 254 bytes.
-fn framed(payload: &[u8]) -> Vec<u8> {
-    let crc = !payload.iter().fold(!0_u32, |crc, byte| {
-        (0..8).fold(crc ^ u32::from(*byte), |crc, _| {
-            crc >> 1 ^ (0xedb8_8320 & 0_u32.wrapping_sub(crc & 1))
-        })
-    });
-    let whole = [payload, &crc.to_le_bytes()].concat();
-    let mut frame = vec![0];
-    for block in whole.split(|byte| *byte == 0) {
-        frame.push(block.len() as u8 + 1);
-        frame.extend(block);
-    }
-    frame.push(0);
-    frame
 }

@@ -18,6 +18,7 @@ fn row<'a>(document: &'a Value, name: &str) -> &'a Value {
 }
 
 #[test]
+#[ignore = "nightly: the emulated board; by day `accept` measures boards that write lines"]
 fn a_board_is_measured_by_its_own_figures_and_with_its_self_test() {
     let (place, truth) = (Place::new(), unit());
     let bench = Bench::carried(AT_REST, &truth);

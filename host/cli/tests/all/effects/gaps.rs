@@ -184,18 +184,3 @@ fn a_given_calibration_has_to_fit_the_recording() {
         "{said}"
     );
 }
-
-#[test]
-fn a_single_dwell_beside_a_given_calibration_leaves_nothing_to_find() {
-    let (from, calibration) = unit(&[("gyro_warm_up", 1e-3, 3)]);
-    let mut one = from;
-    one.dwells.list.truncate(1);
-    let recordings = Recordings {
-        given: Some(&calibration),
-        ..Recordings::from(one)
-    };
-    match diagnose(recordings, Options::IN_SAMPLE) {
-        Ok(found) => assert!(found.effects.is_empty()),
-        Err(refusal) => assert!(refusal.to_string().contains("dwell"), "{refusal}"),
-    }
-}
