@@ -215,35 +215,12 @@ fn an_error_that_one_sensor_sees_changes_the_intervals_of_that_alone() {
     let mut random = Random::new(1, "reference");
     let file = bench::clean(bench::gyro(&mut random), bench::accel(&mut random));
     let none = ReferenceError::default;
+    #[rustfmt::skip]
     let all = [
-        (
-            Sensor::Gyro,
-            ReferenceError {
-                rate: 1e-2,
-                ..none()
-            },
-        ),
-        (
-            Sensor::Accel,
-            ReferenceError {
-                gravity_mps2: 0.1,
-                ..none()
-            },
-        ),
-        (
-            Sensor::Accel,
-            ReferenceError {
-                tilt_deg: 0.5,
-                ..none()
-            },
-        ),
-        (
-            Sensor::Accel,
-            ReferenceError {
-                level_deg: 0.5,
-                ..none()
-            },
-        ),
+        (Sensor::Gyro, ReferenceError { rate: 1e-2,..none() }),
+        (Sensor::Accel, ReferenceError { gravity_mps2: 0.1,..none() }),
+        (Sensor::Accel, ReferenceError { tilt_deg: 0.5,..none() }),
+        (Sensor::Accel, ReferenceError { level_deg: 0.5,..none() }),
     ];
     let widths = |error: ReferenceError| {
         let prepared = bench::recorded(&bench::table_plan(None), &file, 1);

@@ -153,43 +153,17 @@ fn a_file_that_was_edited_or_is_not_enough_is_refused() {
     let folder = folder.path();
     let good = biases([-20.0, 60.0], "V");
     let px4 = format!("export px4 --calibration biases.toml -o out {}", driver());
+    #[rustfmt::skip]
     let edited: [(String, &[&str]); 9] = [
-        (
-            good.replace("biases/1", "biases/2"),
-            &["biases.toml", "mimu-thermal-biases/2", "use the version"],
-        ),
-        (
-            good.replace("temp_c = 0.0", "temp_c = -30.0"),
-            &["biases.toml", "not warmer"],
-        ),
-        (
-            good.replace("temp_c = 0.0", "temp_c = nan"),
-            &["node 2", "NaN"],
-        ),
-        (
-            good.replace("[-20.0, 60.0]", "[60.0, -20.0]"),
-            &["range_c", "increase"],
-        ),
-        (
-            good.replacen("sigma_u = [1e-5", "sigma_u = [-1.0", 1),
-            &["node 1", "standard deviation"],
-        ),
-        (
-            good.replacen("[node.gyro]", "[node.gyros]", 1),
-            &["biases.toml, line", "gyros"],
-        ),
-        (
-            good.replacen("slope_u", "slope", 1),
-            &["biases.toml, line", "slope"],
-        ),
-        (
-            good[..good.find("[[node]]").unwrap()].into(),
-            &["biases.toml", "no node"],
-        ),
-        (
-            good.replacen("u = [", "u = [inf, ", 1),
-            &["biases.toml", "not a number"],
-        ),
+        (good.replace("biases/1", "biases/2"), &["biases.toml", "mimu-thermal-biases/2", "use the version"]),
+        (good.replace("temp_c = 0.0", "temp_c = -30.0"), &["biases.toml", "not warmer"]),
+        (good.replace("temp_c = 0.0", "temp_c = nan"), &["node 2", "NaN"]),
+        (good.replace("[-20.0, 60.0]", "[60.0, -20.0]"), &["range_c", "increase"]),
+        (good.replacen("sigma_u = [1e-5", "sigma_u = [-1.0", 1), &["node 1", "standard deviation"]),
+        (good.replacen("[node.gyro]", "[node.gyros]", 1), &["biases.toml, line", "gyros"]),
+        (good.replacen("slope_u", "slope", 1), &["biases.toml, line", "slope"]),
+        (good[..good.find("[[node]]").unwrap()].into(), &["biases.toml", "no node"]),
+        (good.replacen("u = [", "u = [inf, ", 1), &["biases.toml", "not a number"]),
     ];
     for (text, says) in edited {
         std::fs::write(folder.join("biases.toml"), text).unwrap();

@@ -159,26 +159,15 @@ fn a_lot_is_drawn_unless_the_order_is_given_and_says_its_price() {
 
 #[test]
 fn refusals_are_one_line_with_status_1_and_wrong_usage_has_status_2() {
+    #[rustfmt::skip]
     let cases = [
         ("-n 3", 1, "at least 4"),
-        (
-            "-n 20 --reference gravity --model affine,cross",
-            1,
-            "cross_x_yz",
-        ),
+        ("-n 20 --reference gravity --model affine,cross", 1, "cross_x_yz"),
         ("-n 20 --table faces --model affine,cubic", 1, "cubic_x"),
         ("-n 8 --sensor gyro --reference gravity", 1, "turns"),
-        (
-            "-n 8 --model affine,g-sensitivity",
-            1,
-            "for the gyro (--sensor)",
-        ),
+        ("-n 8 --model affine,g-sensitivity", 1, "for the gyro (--sensor)"),
         ("--scheme xu-rates", 1, "for the gyro (--sensor)"),
-        (
-            "-n 17 --model affine,quadratic --table faces --reference gravity",
-            1,
-            "quadratic",
-        ),
+        ("-n 17 --model affine,quadratic --table faces --reference gravity", 1, "quadratic"),
         ("--budget 0.1", 1, "allow more time"),
         ("--scheme six-face --table two-axis", 1, "three-axis"),
         ("-n 8 --rates 10", 1, "--sensor gyro"),

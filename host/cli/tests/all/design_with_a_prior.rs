@@ -209,34 +209,15 @@ fn people_read_both_half_widths_in_a_hundred_columns() {
 #[test]
 fn what_a_prior_is_not_for_is_refused_by_its_name() {
     let folder = folder();
+    #[rustfmt::skip]
     let cases = [
-        (
-            "--prior kind.toml --table three-axis",
-            1,
-            "--table three-axis with --prior",
-        ),
-        (
-            "--prior kind.toml --table faces -n 9",
-            1,
-            "leave --table out",
-        ),
-        (
-            "--prior kind.toml --reference table",
-            1,
-            "--reference table with --prior",
-        ),
+        ("--prior kind.toml --table three-axis", 1, "--table three-axis with --prior"),
+        ("--prior kind.toml --table faces -n 9", 1, "leave --table out"),
+        ("--prior kind.toml --reference table", 1, "--reference table with --prior"),
         ("--prior kind.toml --sensor gyro", 1, "turns between dwells"),
         ("--prior kind.toml --compare", 1, "--scheme"),
-        (
-            "--prior kind.toml --effects accel_warm_up",
-            1,
-            "leave --prior out",
-        ),
-        (
-            "--prior kind.toml -n 12 --model affine,quadratic",
-            1,
-            "leave --model out",
-        ),
+        ("--prior kind.toml --effects accel_warm_up", 1, "leave --prior out"),
+        ("--prior kind.toml -n 12 --model affine,quadratic", 1, "leave --model out"),
         ("--prior kind.toml -n 12 --rates 100", 1, "at rest"),
         ("--prior kind.toml -n 2", 1, "at least 3"),
         ("--prior gyro.toml", 1, "gyro.toml: it has no accelerometer"),
@@ -246,11 +227,7 @@ fn what_a_prior_is_not_for_is_refused_by_its_name() {
         ("--prior kind.toml -o kind.toml", 1, "kind.toml"),
         ("--prior kind.toml --target accel-scale=0.001", 1, "--dwell"),
         ("--prior kind.toml --target gyro-bias=1", 1, "mimu wizard"),
-        (
-            "--prior kind.toml -n 6 --target accel-bias=1",
-            2,
-            "cannot be used with",
-        ),
+        ("--prior kind.toml -n 6 --target accel-bias=1", 2, "cannot be used with"),
     ];
     for (arguments, status, says) in cases {
         let out = command::mimu(folder.path(), &format!("design {arguments}"));

@@ -139,28 +139,14 @@ fn a_damaged_calibration_file_is_refused_with_its_place() {
     let digit = offset.replacen("0.", "1.", 1);
     assert_ne!(offset, digit);
     let cut = good.find("[accel.judged]").unwrap();
+    #[rustfmt::skip]
     let cases: Vec<(String, &[&str])> = vec![
-        (
-            good.replacen("[gyro]\n", "[gyro]\nscale = 3\n", 1),
-            &["cal.toml, line", "scale"],
-        ),
-        (
-            good.replacen(&offset, "o = [nan, 0.0, 0.0]", 1),
-            &["[gyro]", "not a number"],
-        ),
+        (good.replacen("[gyro]\n", "[gyro]\nscale = 3\n", 1), &["cal.toml, line", "scale"]),
+        (good.replacen(&offset, "o = [nan, 0.0, 0.0]", 1), &["[gyro]", "not a number"]),
         (good.replacen(&offset, &digit, 1), &["[gyro]", "edited"]),
-        (
-            good.replacen("calibration/1", "calibration/9", 1),
-            &["calibration/9", "version of mimu"],
-        ),
-        (
-            good.replacen("direction = \"raw to SI\"", "direction = \"SI to raw\"", 1),
-            &["[gyro]", "SI to raw"],
-        ),
-        (
-            good[..cut].to_string(),
-            &["cal.toml, line", "forward", "cut"],
-        ),
+        (good.replacen("calibration/1", "calibration/9", 1), &["calibration/9", "version of mimu"]),
+        (good.replacen("direction = \"raw to SI\"", "direction = \"SI to raw\"", 1), &["[gyro]", "SI to raw"]),
+        (good[..cut].to_string(), &["cal.toml, line", "forward", "cut"]),
         (good[..good.len() - 9].to_string(), &["cal.toml, line"]),
         (String::new(), &["cal.toml", "missing field"]),
         (place.text("rec"), &["cal.toml, line 1"]),

@@ -136,14 +136,8 @@ fn counts_go_the_whole_way_and_a_calibration_of_another_range_is_refused() {
     std::fs::write(place.path("unit.toml"), text).unwrap();
     let sent = bench.json(&place, &["device", "upload", "unit.toml"]);
     assert_eq!(sent["was_there"], false);
-    let back = [
-        "device",
-        "download",
-        "-o",
-        "back.toml",
-        "--bytes",
-        "back.bin",
-    ];
+    #[rustfmt::skip]
+    let back = ["device", "download", "-o", "back.toml", "--bytes", "back.bin"];
     let contents = bench.json(&place, &back);
     assert_eq!(contents["raw_unit"], "count");
     let again = bench.json(&place, &["device", "upload", "back.toml"]);

@@ -111,14 +111,8 @@ fn dwells_by_time_begin_and_end_with_their_sample_and_parquet_holds_the_same() {
     let fixed = [
         "record", "--port", &peer.path, "-o", "rec", "--for", "3s", "--json", "-",
     ];
-    let more = [
-        "--step-every",
-        "700ms,300ms",
-        "--format",
-        "parquet",
-        "--gravity",
-        "9.81",
-    ];
+    #[rustfmt::skip]
+    let more = ["--step-every", "700ms,300ms", "--format", "parquet", "--gravity", "9.81"];
     let result = mimu(&place, &[&fixed[..], &more].concat()).json();
     assert_eq!(result["dwells"], 3);
     assert!(place.path("rec/samples.parquet").exists());
@@ -277,15 +271,8 @@ fn a_port_that_vanishes_ends_the_recording_with_what_there_is() {
         speed: 2.0,
         ..Script::default()
     });
-    let arguments = [
-        "record",
-        "--port",
-        &peer.path,
-        "-o",
-        "rec",
-        "--reconnect",
-        "300ms",
-    ];
+    #[rustfmt::skip]
+    let arguments = ["record", "--port", &peer.path, "-o", "rec", "--reconnect", "300ms"];
     let run = mimu(&place, &arguments);
     run.refused(&[
         &peer.path,
@@ -407,15 +394,8 @@ fn a_plan_by_time_gives_every_sample_of_a_dwell_its_input() {
         speed: 4.0,
         ..Script::default()
     });
-    let record = [
-        "record",
-        "--port",
-        &peer.path,
-        "-o",
-        "rec",
-        "--plan",
-        "plan.toml",
-    ];
+    #[rustfmt::skip]
+    let record = ["record", "--port", &peer.path, "-o", "rec", "--plan", "plan.toml"];
     let nothing = mimu(&place, &record);
     nothing.refused(&["--plan", "beginnings and ends", "--transit"]);
     let by_time = [&record[..], &["--transit", "250ms", "--json", "-"]].concat();
