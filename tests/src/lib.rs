@@ -37,7 +37,6 @@ pub mod judged;
 pub mod niu;
 pub mod noise_in_use;
 pub mod page;
-pub mod peers;
 pub mod planted;
 pub mod ramp;
 pub mod recordings;

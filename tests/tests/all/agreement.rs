@@ -187,28 +187,6 @@ fn a_channel_without_noise_is_fitted_by_filter_and_least_squares_alike() {
     assert!(apart(&batch.triad, &recursive.triad, &observations) < 1e-12);
 }
 
-/// Small and exact angles differ by products of angles: for angles of 3 %, by about 1e-3 at most.
-#[test]
-fn small_angles_are_exact_ones_to_first_order() {
-    for seed in 0..50 {
-        let mut random = Random::new(seed, "unit");
-        let unit = unit(&mut random);
-        let triad = least_squares(&on_a_table(&noiseless(unit), 1, &mut random), None)
-            .unwrap()
-            .triad;
-        let [small, exact] = [Angles::Small, Angles::Exact].map(|a| triad.physical(a));
-        for i in 0..3 {
-            for (a, b) in [
-                (small.misalignment[i], exact.misalignment[i]),
-                (small.non_orthogonality[i], exact.non_orthogonality[i]),
-            ] {
-                assert!((a.value - b.value).abs() < 4e-3, "{} {}", a.value, b.value);
-            }
-            assert!((small.scale[i].value / exact.scale[i].value - 1.0).abs() < 2e-3);
-        }
-    }
-}
-
 /// The sign of a misalignment angle, against a drawing: θz > 0 turns the sensors by θz about z as seen from the body. A rate about the body's x then
 /// reads +θz on the sensor y, and one about y reads -θz on the sensor x (fang (12), first column and first row).
 #[test]

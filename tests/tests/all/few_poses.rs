@@ -1,6 +1,6 @@
 //! Typical sessions of users: thirteen poses, ten on a fixture, six faces; with a disturbed dwell, or with a correct dwell that no other confirms.
 
-use mimu::fit::{Fit, Method, Options, fit, fit_or_faces};
+use mimu::fit::{Fit, Options, fit, fit_or_faces};
 use mimu::judgement::{Judgement, JudgementKind};
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
@@ -324,24 +324,6 @@ fn readings_in_si_are_judged_uncalibrated_beside_every_fit() {
 }
 
 #[test]
-fn a_clock_that_runs_twice_as_fast_is_asked_about() {
-    let mut session = Session::of(THIRTEEN, QUIET, 1).in_si();
-    for t in &mut session.samples.t_s {
-        *t *= 0.5;
-    }
-    session.manifest.sample_rate_hz *= 2.0;
-    let found = session.fit().expect("thirteen poses");
-    let gyro = found.sensor(Sensor::Gyro).expect("recorded");
-    let mut said = gyro.warnings.iter().map(Warning::to_string);
-    let said = said.find(|w| w.contains("time stamps"));
-    assert!(
-        said.is_some_and(|w| w.contains("0.5")),
-        "{:?}",
-        gyro.warnings
-    );
-}
-
-#[test]
 fn a_channel_whose_step_is_coarser_than_its_noise_is_not_stuck() {
     let mut session = Session::of(THIRTEEN, QUIET, 4);
     // Quantisation step of 0.3 deg/s; the noise of a sample is 0.03 deg/s.
@@ -439,67 +421,6 @@ fn a_dwell_that_turns_through_gravity_without_a_known_force_is_no_noise() {
     }
     let turns_only = Prepared::of(manifest, &batch, search).expect("readable");
     assert!(!turns_only.noise.is_known(Sensor::Accel) && turns_only.noise.is_known(Sensor::Gyro));
-}
-
-#[test]
-fn six_positions_off_level_have_intervals_as_wide_as_their_misfit() {
-    let faces = [
-        [1.0, 0.0, 0.0],
-        [-1.0, 0.0, 0.0],
-        [0.0, 1.0, 0.0],
-        [0.0, -1.0, 0.0],
-        [0.0, 0.0, 1.0],
-        [0.0, 0.0, -1.0],
-    ];
-    let mut plan = String::from(
-        "format = \"mimu-plan/1\"\nsample_rate_hz = 100.0\ncarrier = \"hands\"\nlatitude_deg = 48.0\n",
-    );
-    for up in faces {
-        plan += &format!("[[step]]\nup = {up:?}\ndwell_s = 4.0\n");
-    }
-    // By hand, a few degrees off level; the manifest declares them level.
-    let mut session = Session::of(&plan, QUIET, 3);
-    let found = session.prepared();
-    session.manifest.reference = Reference::Table;
-    let n = session.samples.len();
-    session.samples.step = vec![-1; n];
-    session.samples.reference = [(); 6].map(|()| vec![f64::NAN; n]);
-    for (k, dwell) in found.dwells.list.iter().enumerate() {
-        for row in dwell.first_row as usize..(dwell.first_row + dwell.rows) as usize {
-            session.samples.step[row] = k as i32;
-            for axis in 0..3 {
-                session.samples.reference[3 + axis][row] =
-                    faces[k][axis] * session.manifest.gravity_mps2;
-            }
-        }
-    }
-    let options = Options {
-        method: Method::SixPositions,
-        only: Some(Sensor::Accel),
-        ..Options::default()
-    };
-    let found = fit(session.prepared(), options).expect("six faces");
-    let accel = found.sensor(Sensor::Accel).expect("recorded");
-    let physical = accel.estimated.triad.physical(mimu::triad::Angles::Exact);
-    let mean = physical.scale.iter().map(|s| s.value).sum::<f64>() / 3.0;
-    let half = physical
-        .bias
-        .iter()
-        .map(|b| b.interval / mean)
-        .fold(0.0, f64::max);
-    assert!(
-        half > 0.5 * accel.rms(),
-        "± {half} m/s² beside {} m/s²",
-        accel.rms()
-    );
-    assert!(
-        accel
-            .warnings
-            .iter()
-            .any(|w| w.to_string().contains("off level")),
-        "{:?}",
-        accel.warnings
-    );
 }
 
 #[test]

@@ -78,7 +78,9 @@ fn tallied(runs: u64) -> [[Tally; 2]; 2] {
     tallies
 }
 
-fn judged(runs: u64) {
+#[test]
+fn intervals_that_count_the_errors_of_the_table_hold_the_truth() {
+    let runs = 40;
     let [without, with] = tallied(runs);
     for tally in without.iter().chain(&with) {
         let [mean, low, high] = tally.summary();
@@ -116,17 +118,6 @@ fn judged(runs: u64) {
             tally.name
         );
     }
-}
-
-#[test]
-fn intervals_that_count_the_errors_of_the_table_hold_the_truth() {
-    judged(40);
-}
-
-#[test]
-#[ignore = "nightly: more units"]
-fn the_same_of_four_hundred_units() {
-    judged(400);
 }
 
 /// The derivatives that need no bench: a scale factor errs as gravity or the rate, an angle as the mounting.

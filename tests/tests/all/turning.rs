@@ -96,22 +96,6 @@ fn noise_of_blocks_makes_no_effect_of_a_clean_unit_whose_inputs_turn() {
 }
 
 #[test]
-#[ignore = "nightly: a plan of half an hour; mimu has a short one"]
-fn a_force_that_is_read_with_the_rate_across_it_is_suggested_for_every_axis() {
-    let case = case_on(&turning_plan(1), &["x_accel_rotation_coupling"], 1);
-    assert_eq!(case.verdict, "unexplained", "{case:?}");
-    for (error, one, other) in [("x", "y", "z"), ("y", "z", "x"), ("z", "x", "y")] {
-        // If the rate is along the force, both products are equal.
-        let either = [(one, other), (other, one)]
-            .map(|(rate, force)| format!("term:accel_{error}~rate_{rate}*force_{force}: "));
-        let suggested = |r: &String| {
-            r.contains("a suggestion") && either.iter().any(|e| r.starts_with(e.as_str()))
-        };
-        assert!(case.rejected.iter().any(suggested), "{error}: {case:?}");
-    }
-}
-
-#[test]
 #[ignore = "nightly: more recordings"]
 fn intervals_of_coefficients_hold_the_truth_where_gravity_turns_through_the_unit() {
     let all: Vec<Diagnosis> = (0..40).into_par_iter().map(found).collect();
