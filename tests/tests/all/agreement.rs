@@ -101,10 +101,6 @@ fn kalman_filter_with_a_diffuse_prior_agrees_with_least_squares_to_rounding() {
             worst[1] = worst[1].max((a - b).norm() / a.norm());
         }
     }
-    println!(
-        "largest difference over 200 units: output {:.1e}, covariance {:.1e} relative",
-        worst[0], worst[1]
-    );
     // Readings of 2.5 V in f64 are rounded to 4e-16; the design's condition is below 5. The covariance also contains the extra white variance. Both
     // methods iterate it to 1e-6 if it is not zero.
     assert!(worst[0] < 1e-13, "output: {:e}", worst[0]);
@@ -135,7 +131,6 @@ fn forward_and_inverse_model_agree_on_the_compensated_output() {
             .apply(&forward.triad.forward.apply(&x));
         worst = worst.max((back - x).norm() / x.norm());
     }
-    println!("largest relative difference over 1000 units: {worst:.1e}");
     assert!(worst < 1e-9, "{worst:e}");
 }
 

@@ -146,11 +146,6 @@ fn a_quadratic_of_five_per_cent_on_a_table_comes_alone_and_at_its_size() {
             one.covariance[(axis, axis)].sqrt(),
         );
         let error = one.effect.values[axis] - truth;
-        println!(
-            "{axis}: {:.2} sigma, {:.2} %",
-            error / sigma,
-            100.0 * error / truth
-        );
         assert!(error.abs() < 4.0 * sigma && error.abs() < 4e-3 * truth.abs());
     }
 }
@@ -166,7 +161,6 @@ fn what_describes_a_weak_drift_by_hand_is_named_with_the_drift() {
         for seed in 17..19 {
             let case = by_hand::case(&[id], grade, seed, false);
             if !case.found.is_empty() {
-                println!("{id}: found with seed {seed}");
                 found += 1;
                 assert!(case.is_named_alone(), "{case:?}");
             }
@@ -193,9 +187,6 @@ fn the_published_xsens_session_has_a_gyro_that_feels_force() {
         .find(|s| s.sensor == Sensor::Gyro)
         .unwrap();
     let [before, after] = gyro.decision.held_out_rms.map(f64::to_degrees);
-    println!(
-        "direction of gravity after a turn, held out: {before:.3} deg before, {after:.3} deg after"
-    );
     assert!(before > 0.45 && after < 0.18);
 }
 
@@ -204,7 +195,6 @@ fn nothing_is_added_to_five_units_that_do_not_ask_for_it() {
     for unit in 0..5 {
         let Some(fit) = mikoff(unit) else { return };
         let found = diagnosed(fit);
-        println!("unit {unit}: {}", found.verdict.name());
         assert!(found.effects.is_empty(), "{:?}", found.effects);
     }
 }

@@ -154,10 +154,6 @@ fn a_sound_unit_in_few_poses_is_untested_or_good() {
         let held_out = accel.held_out_rms().expect("held out");
         held_out_beyond_noise += u32::from(held_out > BEYOND_NOISE * accel.noise_floor());
         let judgement = Judgement::of_fit(&found);
-        println!(
-            "seed {seed}: held out {:.1} times the noise; {judgement}",
-            held_out / accel.noise_floor()
-        );
         assert!(
             judgement.kind <= JudgementKind::Untested,
             "seed {seed}: {judgement}"
@@ -197,9 +193,6 @@ fn errors_of_unseen_rows_exceed_the_limit_as_often_as_is_stated() {
         let (rate, mean) = (
             f64::from(failed) / f64::from(runs),
             squares / f64::from(runs),
-        );
-        println!(
-            "{rows} rows, {parameters} parameters: {failed} of {runs} fail, mean square {mean:.3}"
         );
         assert!((mean - 1.0).abs() < 0.03);
         // A quarter of the rate of a session, to what chance allows of 25; where 2.5 times the noise is the limit, fewer.
@@ -280,7 +273,6 @@ fn the_turns_between_ten_poses_of_a_fixture_determine_what_their_magnitudes_leav
         held += inside;
         all += count;
     }
-    println!("{held} of {all}");
     assert!(all >= 36 && 10 * held >= 9 * all, "{held} of {all}");
 }
 

@@ -72,7 +72,6 @@ fn white_noise_bias_instability_and_random_walk_are_within_their_intervals() {
             }
         }
     }
-    println!("of 36 channels N, B, K told {told:?}, inside {inside:?}; Q or R: {strange:?}");
     // The expected number is 34 of 36 (95 %); fewer than 30 have a probability of 3e-3.
     for (i, term) in terms.into_iter().enumerate() {
         assert!(told[i] >= 34, "{term:?} told {}", told[i]);

@@ -60,7 +60,6 @@ fn said(fit: &Fit) -> String {
 
 fn refused(plan: &str, turntable: Turntable) -> String {
     let error = fitted(plan, turntable).expect_err("is refused").to_string();
-    println!("{error}");
     assert!(!error.contains('\n'), "{error}");
     error
 }

@@ -78,7 +78,6 @@ fn the_list_is_first_and_a_summary_has_at_most_25_lines_of_100_columns() {
         let fit = fitted(&plan);
         let result = FitResult::of(&fit);
         let [summary, all] = [false, true].map(|verbose| fit_text(&result, verbose));
-        println!("{summary}");
         assert!(summary.lines().count() <= 25, "{summary}");
         // A sentence is one line; tables keep to the columns.
         let sentences = ["  - ", "warning:", "next:", "judgement:"];

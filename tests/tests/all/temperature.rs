@@ -246,7 +246,6 @@ fn lags(seeds: u64) -> Held {
             }
         }
     }
-    println!("{held:?}");
     held
 }
 

@@ -103,25 +103,14 @@ fn intervals_of_coefficients_hold_the_truth_where_gravity_turns_through_the_unit
         .iter()
         .filter(|d| ids(d) == ["accel_size_effect", "gyro_g_sensitivity"]);
     let named: Vec<&Diagnosis> = named.collect();
-    println!(
-        "{} of {} have both effects and no other",
-        named.len(),
-        all.len()
-    );
     assert!(named.len() >= 38);
     let errors: Vec<f64> = named.iter().flat_map(|d| errors(d)).collect();
     let n = errors.len() as f64;
     let inside = errors.iter().filter(|e| e.abs() < 1.96).count() as f64 / n;
-    let rms = (errors.iter().map(|e| e * e).sum::<f64>() / n).sqrt();
-    println!(
-        "{n} coefficients, 95 % intervals hold {:.1} %, rms error {rms:.3} sigma",
-        100.0 * inside
-    );
     // Four sigmas for this number of coefficients, as if they were independent.
     let margin = 4.0 * (0.07 * 0.93 / n).sqrt();
     assert!((0.93 - margin..0.97 + margin).contains(&inside), "{inside}");
     let worst = named.iter().flat_map(|d| errors_of_arms(d).concat());
     let worst = worst.fold(0.0, |most: f64, e| most.max(e.abs()));
-    println!("arms off by at most {worst:.2} mm");
     assert!(worst < 1.0);
 }

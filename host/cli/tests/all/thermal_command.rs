@@ -135,7 +135,6 @@ fn niu_s_unit_gets_curves_and_lags_that_hold_the_truth_and_another_run_agrees() 
         ),
     ] {
         let [short, all] = [short, verbose].map(|arguments| done(folder, arguments));
-        println!("{short}");
         assert!(short.lines().count() <= 25, "{short}");
         assert!(all.lines().count() > short.lines().count(), "{all}");
         let sentences = ["verdict:", "judgement:", "warning:", "next:"];
@@ -226,7 +225,6 @@ fn a_rest_ramp_upon_poses_at_room_temperature_halves_the_error_of_a_sweep_and_is
         result["sensors"]["gyro"]["rms"].as_f64().unwrap()
     };
     let [with, without] = [left("cal.toml"), left("room.toml")];
-    println!("{without} rad/s with room.toml, {with} with the curves");
     assert!(with < 0.5 * without, "{without}, {with}");
     let exported = done(
         folder,

@@ -167,13 +167,11 @@ fn a_plan_is_carried_out_and_its_recording_has_the_inputs_of_the_bench_and_is_fi
     assert!(out.status.success(), "{}", self::told(&out));
     let fit = json(&bench.path("fit.json"));
     let range = &fit["range_c"];
-    println!("{told}\n{}", fit["sensors"]);
     // By self-heating the dies are warmer than the chamber.
     let span = range[1].as_f64().unwrap() - range[0].as_f64().unwrap();
     assert!((10.0..14.0).contains(&span), "{range}");
     let calibration = Calibration::read(&bench.path("cal.toml")).unwrap();
     let [gyro, accel] = errors(&calibration, &bench.truth);
-    println!("errors: gyro {gyro:.5} rad/s, accel {accel:.5} m/s²");
     // As for a session of the wizard: 18 dwells of 2.5 s instead of twelve of 1 s, but also a slope over temperature.
     assert!(gyro < 0.2f64.to_radians() && accel < 0.02, "{gyro} {accel}");
 }

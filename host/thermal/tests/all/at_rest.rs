@@ -310,7 +310,6 @@ fn a_cubesats_gyro_cooled_one_way_has_straight_lines() {
     let beside = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
     let all = std::env::var_os("MIMU_DATA").map_or(beside, Into::into);
     let Ok(text) = std::fs::read_to_string(all.join("pan_tvac_gyro/TVCtest3_7_20.csv")) else {
-        println!("skipped: no recordings (set MIMU_DATA)");
         return;
     };
     let mut samples = Samples::default();
@@ -344,10 +343,6 @@ fn a_cubesats_gyro_cooled_one_way_has_straight_lines() {
     let manifest = Manifest::new("pan", 50.0, 9.80665, RawUnit::Si, Reference::Gravity);
     let found = fit(vec![session((manifest, samples)).unwrap()], &[], JOINT).unwrap();
     let result = ThermalResult::of(&found);
-    println!(
-        "{} to {} °C: {:?}",
-        result.range_c[0], result.range_c[1], result.warnings
-    );
     assert_eq!(result.verdict, FitVerdict::OneWay);
     assert!(
         result

@@ -61,7 +61,6 @@ fn a_rest_ramp_gives_a_calibration_over_temperature_that_is_as_good_as_its_inter
     for sensor in Sensor::BOTH {
         let (with, without) = (errors(&curves, sensor), errors(&base, sensor));
         let [with_rms, without_rms] = [rms(&with), rms(&without)];
-        println!("{sensor}: {without_rms} without the curves, {with_rms} with");
         assert!(
             with_rms < 0.1 * without_rms,
             "{sensor}: {with_rms}, {without_rms}"

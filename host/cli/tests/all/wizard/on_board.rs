@@ -120,7 +120,6 @@ fn the_devices_own_filters_make_the_calibration_and_a_dwell_with_a_lost_line_lea
     assert_eq!(stored, "session/calibration.toml", "{told}");
     let calibration = Calibration::read(&bench.path("session/calibration.toml")).unwrap();
     let [gyro, accel] = errors(&calibration, &bench.truth);
-    println!("errors: gyro {gyro:.5} rad/s, accel {accel:.5} m/s²; {told}");
     assert!(gyro < 0.2f64.to_radians() && accel < 0.02, "{gyro} {accel}");
 }
 
@@ -163,12 +162,9 @@ fn a_session_that_was_killed_and_unplugged_goes_on_to_a_stored_calibration_that_
     assert_eq!(found["stored"], "session/calibration.toml", "{told}");
 
     let calibration = Calibration::read(&bench.path("session/calibration.toml")).unwrap();
-    let [gyro, accel] = errors(&calibration, &bench.truth);
     // Dwells of one second give 0.11 deg/s and 0.5 mg. Which of them are repeated depends on the instant of the interruption, and so does the noise: the
     // intervals tell whether the stored calibration holds the truth.
-    println!("errors: gyro {gyro:.5} rad/s, accel {accel:.5} m/s²");
     let worst = half_intervals(&calibration, &bench.truth);
-    println!("worst: {worst:?} half intervals");
     assert!(worst.into_iter().all(|w| w < 2.0), "{worst:?}");
     // The recording is an ordinary one.
     let manifest =
