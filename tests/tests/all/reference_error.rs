@@ -9,6 +9,7 @@ use mimu_rig::random::Random;
 use mimu_rig::rig_file::{AffineFile, RigFile};
 use mimu_tests::bench;
 use mimu_tests::coverage::Tally;
+use mimu_tests::says;
 
 /// Half of a 95 % interval in standard deviations.
 const HALF: f64 = 1.959_964;
@@ -241,8 +242,9 @@ fn errors_that_a_fit_cannot_count_are_refused_by_name() {
     let by_hand = bench::recorded(&bench::hand_plan(20), &file, 1);
     let refused = fit(by_hand.with_reference_error(stated()), Options::default());
     let said = refused.unwrap_err().to_string();
-    for key in ["rate", "mounting_deg", "tilt_deg", "orthogonality_deg"] {
-        assert!(said.contains(key), "{said}");
-    }
+    says(
+        &said,
+        &["rate", "mounting_deg", "tilt_deg", "orthogonality_deg"],
+    );
     assert!(said.contains("only gravity_mps2 applies"), "{said}");
 }

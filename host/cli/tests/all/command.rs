@@ -33,3 +33,11 @@ pub fn refused(folder: &Path, arguments: &str) -> String {
     assert!(line.starts_with("mimu: "), "mimu {arguments}: {error}");
     line
 }
+
+/// Checks that `text` contains all these words.
+#[track_caller]
+pub fn says(text: &str, words: &[&str]) {
+    for word in words {
+        assert!(text.contains(word), "{word:?} is not in: {text}");
+    }
+}

@@ -7,6 +7,7 @@ use mimu_core::wire::{PROTOCOL, Version, WrongRegister};
 use super::peer::{Behaviour, Peer, Script};
 use super::terminal::Terminal;
 use super::{Place, command, mimu};
+use crate::command::says;
 
 fn info(script: Script, extra: &[&str]) -> super::Ran {
     let peer = Peer::new(script);
@@ -25,14 +26,15 @@ fn a_device_says_who_it_is() {
     assert_eq!(result["raw_unit"], "V");
     assert!(result["stored"].is_null());
     let text = info(Script::default(), &[]).stdout;
-    for word in [
-        "a script",
-        "panic in src/x.rs, line 7",
-        "3 starts",
-        "calibration   none",
-    ] {
-        assert!(text.contains(word), "{word:?} is not in: {text}");
-    }
+    says(
+        &text,
+        &[
+            "a script",
+            "panic in src/x.rs, line 7",
+            "3 starts",
+            "calibration   none",
+        ],
+    );
 }
 
 fn speaking(major: u8, minor: u8) -> Script {
@@ -73,10 +75,7 @@ fn a_sensor_that_is_missing_is_named_with_what_it_reads() {
     };
     let told = info(script, &["--json", "-"]).json();
     let warning = told["warnings"][0].as_str().unwrap();
-    assert!(
-        warning.contains("WHO_AM_I reads 0x00, and 0x47 was expected"),
-        "{warning}"
-    );
+    says(&warning, &["WHO_AM_I reads 0x00, and 0x47 was expected"]);
     assert_eq!(told["wrong_register"]["found"], 0);
 }
 

@@ -9,6 +9,7 @@ use mimu_recording::{Manifest, Recording, Reference};
 
 use super::peer::{Act, Peer, Script};
 use super::{Place, mimu, start};
+use crate::command::says;
 
 /// A table with a chamber behind a TCP address; it reports busy for two queries after each motion.
 struct Equipment {
@@ -234,10 +235,7 @@ fn an_interrupted_procedure_is_a_recording_that_says_it_is_cut_short() {
     let out = child.wait_with_output().unwrap();
     let told = String::from_utf8_lossy(&out.stderr);
     assert_eq!(out.status.code(), Some(1), "{told}");
-    assert!(
-        told.contains("it was interrupted and is incomplete"),
-        "{told}"
-    );
+    says(&told, &["it was interrupted and is incomplete"]);
     let all = equipment.told();
     assert_eq!(all[all.len() - 2..], ["STOP", "CHAMBER 25.000000"]);
     let manifest = Manifest::read(&place.path("rec/recording.toml")).unwrap();

@@ -1,6 +1,7 @@
 //! `mimu wizard` with the firmware's release image on the emulated board, on a turntable and in hands that it commands. Killed, unplugged, garbled
 //! and disturbed sessions end with the right calibration or with a clear message, and never store a wrong one.
 use super::bench::{Bench, in_repository, unit};
+use crate::command::says;
 use mimu::calibration::Calibration;
 use mimu::quantity::Sensor;
 use mimu_rig::rig_file::RigTruth;
@@ -112,10 +113,7 @@ fn the_devices_own_filters_make_the_calibration_and_a_dwell_with_a_lost_line_lea
     let told =
         String::from_utf8_lossy(&out.stdout).into_owned() + &String::from_utf8_lossy(&out.stderr);
     assert!(out.status.success(), "{told}");
-    assert!(
-        told.contains("the calibration is the device's estimate"),
-        "{told}"
-    );
+    says(&told, &["the calibration is the device's estimate"]);
     let stored = bench.outcome()["units"][0]["stored"].clone();
     assert_eq!(stored, "session/calibration.toml", "{told}");
     let calibration = Calibration::read(&bench.path("session/calibration.toml")).unwrap();
@@ -199,10 +197,7 @@ fn a_table_that_turns_the_wrong_axis_stops_the_session_and_nothing_is_stored() {
     let out = bench.wizard(&arguments).output().unwrap();
     let told = String::from_utf8_lossy(&out.stderr);
     assert_eq!(out.status.code(), Some(1), "{told}");
-    assert!(
-        told.contains("are not met") && told.contains("wrong pose"),
-        "{told}"
-    );
+    says(&told, &["are not met", "wrong pose"]);
     assert!(!bench.path("session/calibration.toml").exists());
 }
 
@@ -220,9 +215,6 @@ fn a_driver_file_with_a_mistake_is_refused_with_its_line() {
         .output()
         .unwrap();
     let told = String::from_utf8_lossy(&out.stderr);
-    assert!(
-        told.contains("line 5") && told.contains("interlok"),
-        "{told}"
-    );
+    says(&told, &["line 5", "interlok"]);
     assert_eq!(out.status.code(), Some(1));
 }
