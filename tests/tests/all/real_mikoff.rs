@@ -15,28 +15,11 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 /// b (m/s²), gyro s (%), m (deg), b (deg/s), eps (deg).
 type Parameters = [f64; 21];
 
+#[rustfmt::skip]
 const NAMES: [&str; 21] = [
-    "accel s_x %",
-    "accel s_y %",
-    "accel s_z %",
-    "accel m_yz deg",
-    "accel m_xy deg",
-    "accel m_xz deg",
-    "accel b_x m/s2",
-    "accel b_y m/s2",
-    "accel b_z m/s2",
-    "gyro s_x %",
-    "gyro s_y %",
-    "gyro s_z %",
-    "gyro m_yz deg",
-    "gyro m_xy deg",
-    "gyro m_xz deg",
-    "gyro b_x deg/s",
-    "gyro b_y deg/s",
-    "gyro b_z deg/s",
-    "gyro eps_x deg",
-    "gyro eps_y deg",
-    "gyro eps_z deg",
+    "accel s_x %", "accel s_y %", "accel s_z %", "accel m_yz deg", "accel m_xy deg", "accel m_xz deg", "accel b_x m/s2", "accel b_y m/s2",
+    "accel b_z m/s2", "gyro s_x %", "gyro s_y %", "gyro s_z %", "gyro m_yz deg", "gyro m_xy deg", "gyro m_xz deg", "gyro b_x deg/s",
+    "gyro b_y deg/s", "gyro b_z deg/s", "gyro eps_x deg", "gyro eps_y deg", "gyro eps_z deg",
 ];
 
 /// The published table: a row for each parameter, a column for each unit.

@@ -9,16 +9,9 @@ use crate::command::says;
 
 /// 0.8 % of 1665 counts per m/s², 4 mrad, 0.2 m/s².
 const SIZES: [f64; 9] = [13.32, 13.32, 13.32, 4e-3, 4e-3, 4e-3, 333.0, 333.0, 333.0];
+#[rustfmt::skip]
 const NAMES: [&str; 9] = [
-    "scale_x",
-    "scale_y",
-    "scale_z",
-    "non_orthogonality_yz",
-    "non_orthogonality_zy",
-    "non_orthogonality_zx",
-    "bias_x",
-    "bias_y",
-    "bias_z",
+    "scale_x", "scale_y", "scale_z", "non_orthogonality_yz", "non_orthogonality_zy", "non_orthogonality_zx", "bias_x", "bias_y", "bias_z",
 ];
 
 /// A prior of `sensor` whose parameters are independent.

@@ -226,16 +226,8 @@ fn an_import_that_fails_leaves_nothing_behind() {
     let before = place.names();
     let import = |file: &str, arguments: &[&str]| {
         let (file, out) = (place.text(file), place.text("out"));
-        let fixed = [
-            "import",
-            &file,
-            "--raw-unit",
-            "count",
-            "--reference",
-            "gravity",
-            "-o",
-            &out,
-        ];
+        #[rustfmt::skip]
+        let fixed = ["import", &file, "--raw-unit", "count", "--reference", "gravity", "-o", &out];
         mimu(fixed.into_iter().chain(arguments.iter().copied()))
     };
     let inputs = place.text("inputs.csv");

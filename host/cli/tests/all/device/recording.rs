@@ -444,22 +444,10 @@ fn a_table_of_inputs_is_taken_by_the_labels_of_its_rows_and_turns_at_the_end() {
         speed: 4.0,
         ..Script::default()
     });
+    #[rustfmt::skip]
     let arguments = [
-        "record",
-        "--port",
-        &peer.path,
-        "-o",
-        "rec",
-        "--inputs",
-        "inputs.csv",
-        "--step-every",
-        "500ms,100ms",
-        "--for",
-        "1100ms",
-        "--gravity",
-        "9.81",
-        "--json",
-        "-",
+        "record", "--port", &peer.path, "-o", "rec", "--inputs", "inputs.csv", "--step-every", "500ms,100ms", "--for", "1100ms", "--gravity",
+        "9.81", "--json", "-",
     ];
     let result = mimu(&place, &arguments).json();
     // Of the last one nothing was recorded, which is reported.

@@ -185,15 +185,8 @@ fn a_table_that_turns_the_wrong_axis_stops_the_session_and_nothing_is_stored() {
     )
     .unwrap();
     let plan = short_plan(&bench);
-    let arguments = [
-        "--fixture",
-        "table",
-        "--plan",
-        &plan,
-        "--as-planned",
-        "--patience",
-        "4",
-    ];
+    #[rustfmt::skip]
+    let arguments = ["--fixture", "table", "--plan", &plan, "--as-planned", "--patience", "4"];
     let out = bench.wizard(&arguments).output().unwrap();
     let told = String::from_utf8_lossy(&out.stderr);
     assert_eq!(out.status.code(), Some(1), "{told}");

@@ -137,16 +137,8 @@ fn the_terminal_is_given_back_after_the_end_by_a_key_and_by_control_c() {
 fn the_terminal_is_given_back_before_an_error_is_told() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out").display().to_string();
-    let arguments = [
-        "wizard",
-        "-o",
-        &out,
-        "--gravity",
-        "9.8",
-        "--text",
-        "--port",
-        "/nowhere",
-    ];
+    #[rustfmt::skip]
+    let arguments = ["wizard", "-o", &out, "--gravity", "9.8", "--text", "--port", "/nowhere"];
     let (seen, same, code) = WizardSession::begin([80, 24], &arguments).end();
     let left = seen.rfind(LEFT).unwrap();
     assert!(seen.contains(ENTERED) && same, "{seen:?}");
