@@ -12,7 +12,6 @@ use mimu::quantity::Sensor;
 use mimu::signal::stillness::STILL_FACTOR;
 use mimu::warning::Warning;
 use mimu_recording::{RawUnit, Recording};
-use mimu_rig::random::Random;
 use mimu_rig::rig_file::{AffineFile, RigFile};
 use mimu_tests::bench;
 use nalgebra::{Matrix3, Vector3};
@@ -20,8 +19,7 @@ use nalgebra::{Matrix3, Vector3};
 const SEED: u64 = 4;
 
 fn unit() -> RigFile {
-    let mut random = Random::new(SEED, "unit");
-    bench::clean(bench::gyro(&mut random), bench::accel(&mut random))
+    bench::drawn(SEED, "unit")
 }
 
 fn fitted(prepared: Prepared) -> Fit {

@@ -5,15 +5,12 @@ use mimu::effects;
 use mimu::fit::Options;
 use mimu::plan::next_experiment::prediction::Target;
 use mimu::plan::next_experiment::{Next, Setup, next, smallest};
-use mimu_rig::random::Random;
 use mimu_rig::rig_file::{EffectFile, RigFile};
 use mimu_tests::bench;
 
 /// A unit with one effect, x, y and z of the given sizes.
 fn unit(id: &str, key: &str, sizes: [f64; 3]) -> RigFile {
-    let mut random = Random::new(5, "unit");
-    let (gyro, accel) = (bench::gyro(&mut random), bench::accel(&mut random));
-    let mut file = bench::clean(gyro, accel);
+    let mut file = bench::drawn(5, "unit");
     let sizes = toml::Value::Array(sizes.map(toml::Value::Float).to_vec());
     file.effect = vec![EffectFile {
         id: id.into(),

@@ -91,8 +91,7 @@ fn means_of_samples_behind_the_filters_of_fangs_parts_scatter_as_the_budget_says
     const STEPS: usize = 8;
     const RATE_HZ: usize = 1000;
     const SECONDS: usize = 300;
-    let mut random = Random::new(1, "unit");
-    let mut file: RigFile = bench::clean(bench::gyro(&mut random), bench::accel(&mut random));
+    let mut file: RigFile = bench::drawn(1, "unit");
     for axes in [&mut file.unit.gyro_axes, &mut file.unit.accel_axes] {
         (axes.instability_si, axes.walk_si) = (Some([0.0; 3]), Some([0.0; 3]));
     }

@@ -5,7 +5,6 @@ use mimu::recording_problem::RecordingProblem;
 use mimu::result::fit::FitResult;
 use mimu_cli::report::fit_text;
 use mimu_recording::RawUnit;
-use mimu_rig::random::Random;
 use mimu_rig::rig_file::RigFile;
 use mimu_tests::bench;
 use mimu_tests::says;
@@ -14,8 +13,7 @@ const FIXTURE: &str = include_str!("../../../rig/plans/fixture.toml");
 const SEED: u64 = 4;
 
 fn unit() -> RigFile {
-    let mut random = Random::new(SEED, "unit");
-    bench::clean(bench::gyro(&mut random), bench::accel(&mut random))
+    bench::drawn(SEED, "unit")
 }
 
 fn fitted(plan: &str) -> Fit {

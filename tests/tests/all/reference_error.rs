@@ -124,8 +124,7 @@ fn intervals_that_count_the_errors_of_the_table_hold_the_truth() {
 /// The derivatives that need no bench: a scale factor errs as gravity or the rate, an angle as the mounting.
 #[test]
 fn what_no_pose_shows_widens_the_intervals_by_all_of_it() {
-    let mut random = Random::new(1, "reference");
-    let file = bench::clean(bench::gyro(&mut random), bench::accel(&mut random));
+    let file = bench::drawn(1, "reference");
     let error = ReferenceError {
         gravity_mps2: 0.01,
         rate: 1e-3,
@@ -204,8 +203,7 @@ fn by_hand_intervals_that_count_the_error_of_gravity_hold_the_truth() {
 /// Each alone: an error that one of the sensors does not see leaves its intervals as they are.
 #[test]
 fn an_error_that_one_sensor_sees_changes_the_intervals_of_that_alone() {
-    let mut random = Random::new(1, "reference");
-    let file = bench::clean(bench::gyro(&mut random), bench::accel(&mut random));
+    let file = bench::drawn(1, "reference");
     let none = ReferenceError::default;
     #[rustfmt::skip]
     let all = [
@@ -237,8 +235,7 @@ fn an_error_that_one_sensor_sees_changes_the_intervals_of_that_alone() {
 
 #[test]
 fn errors_that_a_fit_cannot_count_are_refused_by_name() {
-    let mut random = Random::new(1, "refused");
-    let file = bench::clean(bench::gyro(&mut random), bench::accel(&mut random));
+    let file = bench::drawn(1, "refused");
     let by_hand = bench::recorded(&bench::hand_plan(20), &file, 1);
     let refused = fit(by_hand.with_reference_error(stated()), Options::default());
     let said = refused.unwrap_err().to_string();

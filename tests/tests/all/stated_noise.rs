@@ -6,7 +6,6 @@ use mimu::plan::design::budget::DwellNoise;
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
 use mimu::warning::Warning;
-use mimu_rig::random::Random;
 use mimu_tests::bench;
 use mimu_tests::says;
 
@@ -14,9 +13,7 @@ const SEED: u64 = 3;
 
 /// A recording with the true noise of its unit.
 fn recorded() -> (Prepared, NoiseFile) {
-    let mut random = Random::new(SEED, "unit");
-    let (gyro, accel) = (bench::gyro(&mut random), bench::accel(&mut random));
-    let file = bench::clean(gyro, accel);
+    let file = bench::drawn(SEED, "unit");
     let prepared = bench::recorded(&bench::table_plan(Some(SEED)), &file, SEED);
     let noise = bench::noise_file(&file, SEED, prepared.condensed.period_s);
     (prepared, noise)

@@ -58,9 +58,7 @@ fn randomised(mut steps: Vec<Step>, seed: u64) -> Vec<Step> {
 
 /// A warmed-up unit whose thermometer is on its dies and that does not heat itself: the only lag is the effect's.
 fn unit(effects: &[&str], seed: u64) -> RigFile {
-    let mut random = Random::new(seed, "unit");
-    let (gyro, accel) = (bench::gyro(&mut random), bench::accel(&mut random));
-    let mut file = bench::clean(gyro, accel);
+    let mut file = bench::drawn(seed, "unit");
     file.thermal.on_before_s = Some(f64::INFINITY);
     file.thermal.die_lag_s = Some([1.0; 4]);
     file.thermal.die_heating_c = Some([0.0; 4]);

@@ -3,7 +3,6 @@
 use mimu::diagnose::{Diagnosis, diagnose};
 use mimu::fit::Options;
 use mimu::quantity::Sensor;
-use mimu_rig::random::Random;
 use mimu_rig::rig_file::EffectFile;
 use mimu_tests::bench;
 use mimu_tests::blind::{case_on, turning_plan};
@@ -20,9 +19,7 @@ const ARMS_MM: [[f64; 3]; 3] = [[6.0, 0.0, 0.0], [0.0, -4.0, 0.0], [1.0, 3.0, 0.
 
 /// A unit with a g-sensitivity and a size effect, off the centre of a table without other flaws.
 fn found(seed: u64) -> Diagnosis {
-    let mut random = Random::new(seed, "unit");
-    let (gyro, accel) = (bench::gyro(&mut random), bench::accel(&mut random));
-    let mut file = bench::clean(gyro, accel);
+    let mut file = bench::drawn(seed, "unit");
     file.table.offset_mm = BESIDE_MM;
     let effect = |id: &str, name: &str, matrix: [[f64; 3]; 3]| {
         let rows = matrix.map(|row| toml::Value::Array(row.map(toml::Value::Float).to_vec()));
