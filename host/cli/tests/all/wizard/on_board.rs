@@ -99,6 +99,7 @@ fn on_table(plan: &str) -> [&str; 9] {
 }
 
 #[test]
+#[ignore = "nightly: a session on the emulated board; by day `device::conversation` compares the filters"]
 fn the_devices_own_filters_make_the_calibration_and_a_dwell_with_a_lost_line_leaves_no_trace() {
     let mut bench = Bench::new("table", unit(8), 8);
     let plan = short_plan(&bench);
@@ -176,6 +177,7 @@ fn a_session_that_was_killed_and_unplugged_goes_on_to_a_stored_calibration_that_
 }
 
 #[test]
+#[ignore = "nightly: a session on the emulated board; by day `device::thermal_record` ends at a wrong pose"]
 fn a_table_that_turns_the_wrong_axis_stops_the_session_and_nothing_is_stored() {
     let bench = Bench::new("table", unit(7), 7);
     let driver = std::fs::read_to_string(bench.path("driver.toml")).unwrap();
