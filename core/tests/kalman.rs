@@ -131,10 +131,6 @@ fn single_precision_stays_positive_and_true_over_ten_million_updates() {
         let sigma = double.covariance()[(i, i)].sqrt();
         let off = f64::from(single.mean()[i]) - double.mean()[i];
         let ratio = f64::from(covariance[(i, i)].sqrt()) / sigma;
-        println!(
-            "state {i}: f32 less f64 {:+.3} sigma, sigma f32/f64 {ratio:.4}",
-            off / sigma
-        );
         // For a bias of 2.5 V, a unit in the last place of f32 is 0.25 of its sigma here.
         assert!(
             off.abs() < 0.5 * sigma,

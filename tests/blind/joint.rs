@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 
-use mimu_tests::by_hand::Grade;
 use mimu_tests::joint::{Case, Judged, Set, case};
 use rayon::prelude::*;
 
@@ -66,17 +65,12 @@ fn both(case: &Case) -> [Option<Judged>; 2] {
 
 const HEAD: &str = "| | sets | all effects named | something named that is not there | refused | gyro worse, as written (worst ratio) | accelerometer | gyro worse, without a constant error | accelerometer |\n|---|---:|---:|---:|---:|---:|---:|---:|---:|";
 
-/// Runs `sets` sets from the seed `first` on. With `warm_up`, each set has that many sessions of a digital unit by hand, whose only effect is a
-/// warm-up of the accelerometer.
-pub fn run(sets: u64, first: u64, warm_up: Option<usize>) {
-    let of = |seed| match warm_up {
-        Some(sessions) => Set::of_warm_up(sessions, seed),
-        None => Set::of(seed),
-    };
+/// Runs `sets` sets from the seed `first` on.
+pub fn run(sets: u64, first: u64) {
     let cases: Vec<(u64, Case)> = (first..first + sets)
         .into_par_iter()
         .map(|seed| {
-            let case = case(&of(seed));
+            let case = case(&Set::of(seed));
             println!("{}", line(seed, &case));
             (seed, case)
         })
@@ -148,112 +142,4 @@ fn line(seed: u64, case: &Case) -> String {
         set.effects,
         case.verdict,
     )
-}
-
-/// Cubics of an accelerometer, mg/g³ along x, y, z.
-const CUBICS: [(&str, [f64; 3]); 4] = [
-    ("mg_per_g3 = [12.0, 12.0, 12.0]", [12.0; 3]),
-    ("mg_per_g3 = [12.0, -12.0, 12.0]", [12.0, -12.0, 12.0]),
-    ("mg_per_g3 = [12.0, 0.0, 0.0]", [12.0, 0.0, 0.0]),
-    ("mg_per_g3 = [4.0, 4.0, 4.0]", [4.0; 3]),
-];
-/// Poses in all directions, and within so many degrees of a face.
-const POSES: [Option<f64>; 3] = [None, Some(15.0), Some(10.0)];
-/// 1 m/s² per (m/s²)³ in mg/g³.
-const MG_PER_G3: f64 = 1e3 * 9.806_65 * 9.806_65;
-
-/// What became of the cubics of one size and grade, over their seeds.
-#[derive(Debug, Clone, Copy, Default)]
-struct Cubics {
-    sets: u32,
-    accepted: u32,
-    /// Coefficients of accepted effects inside their 95 % intervals, and number of all; one that the file lacks is 0 without an interval.
-    inside: [u32; 2],
-    /// Sum of the squares of their errors, (mg/g³)².
-    squares: f64,
-    /// Sums of the squares of the errors on another session without effects and with them: force as a vector (m/s²), rate over turns (deg),
-    /// direction of gravity after turns (deg).
-    errors: [[f64; 2]; 3],
-    /// Files with effects that err more there by each of these.
-    worse: [u32; 3],
-}
-
-impl Cubics {
-    fn add(&mut self, case: &Case, truth: [f64; 3]) {
-        self.sets += 1;
-        let found = case.effects.iter().find(|e| e.id() == "accel_scale_cubic");
-        if let Some(found) = found {
-            self.accepted += 1;
-            for (axis, truth) in truth.iter().enumerate() {
-                let at = found.candidate.active.iter().position(|k| *k == axis);
-                let value = at.map_or(0.0, |at| MG_PER_G3 * found.values[at]);
-                let half = at.map_or(0.0, |at| 1.96 * MG_PER_G3 * found.sigmas[at]);
-                self.inside[0] += u32::from((value - truth).abs() <= half);
-                self.inside[1] += 1;
-                self.squares += (value - truth).powi(2);
-            }
-        }
-        let (Some(judged), Some(directions)) = (case.as_written, case.directions) else {
-            return;
-        };
-        let judged = judged.of_files;
-        let all = [judged.map(|of| of[1]), judged.map(|of| of[0]), directions];
-        for (k, [without, with]) in all.into_iter().enumerate() {
-            self.errors[k][0] += without * without;
-            self.errors[k][1] += with * with;
-            self.worse[k] += u32::from(with > 1.02 * without);
-        }
-    }
-
-    fn row(&self, name: &str) -> String {
-        let rms = |sum: f64| (sum / f64::from(self.sets)).sqrt();
-        let [force, rate, direction] = self.errors.map(|e| e.map(rms));
-        format!(
-            "| {name} | {} | {} | {:.1} | {} of {} | {:.1} to {:.1} ({}) | {:.4} to {:.4} ({}) | {:.4} to {:.4} ({}) |",
-            self.sets,
-            self.accepted,
-            (self.squares / f64::from(self.inside[1].max(1))).sqrt(),
-            self.inside[0],
-            self.inside[1],
-            1e3 * force[0],
-            1e3 * force[1],
-            self.worse[0],
-            rate[0],
-            rate[1],
-            self.worse[1],
-            direction[0],
-            direction[1],
-            self.worse[2],
-        )
-    }
-}
-
-/// Runs `sets` seeds, from the seed `first` on, of the cubics, poses and grades whose names contain all of `chosen`.
-pub fn run_cubics(sets: u64, first: u64, chosen: &[&str]) {
-    println!(
-        "| cubic, grade | sets | accepted | error, rms, mg/g³ | inside the 95 % interval | force on another session, mm/s² (worse) | turns, deg (worse) | direction after turns, deg (worse) |\n|---|---:|---:|---:|---:|---:|---:|---:|"
-    );
-    let kinds = CUBICS.into_iter().flat_map(|c| POSES.map(|near| (c, near)));
-    for ((size, truth), near_faces_deg) in kinds {
-        for grade in Grade::ALL {
-            let poses = near_faces_deg.map_or("all".into(), |d| format!("within {d}° of a face"));
-            let name = format!("{truth:?}, {poses}, {grade:?}");
-            if !chosen.iter().all(|c| name.contains(c)) {
-                continue;
-            }
-            let cases: Vec<Case> = (first..first + sets)
-                .into_par_iter()
-                .map(|seed| case(&Set::of_cubic(size, near_faces_deg, grade, seed)))
-                .collect();
-            let mut all = Cubics::default();
-            for (case, seed) in cases.iter().zip(first..) {
-                all.add(case, truth);
-                let cubic = |r: &&String| r.starts_with("accel_scale_cubic");
-                for rejected in case.rejected.iter().filter(cubic) {
-                    println!("{name}, seed {seed}: {rejected}");
-                }
-            }
-            println!("{}", all.row(&name));
-        }
-    }
 }

@@ -100,33 +100,30 @@ pub fn run(sessions: u64, chosen: &[&str]) {
         let of = |seed| {
             let clean = kind.clean(seed);
             let with_effect = kind.with_effect(seed, true);
-            eprintln!("{}", told(kind, seed, clean.as_ref(), with_effect.as_ref()));
+            eprintln!("{}", told(kind, seed, &clean, with_effect.as_ref()));
             (clean, with_effect)
         };
         let all: Vec<_> = (0..sessions).into_par_iter().map(of).collect();
-        let (clean, with_effect): (Vec<_>, Vec<_>) = all.into_iter().unzip();
+        let (clean, with_effect): (_, Vec<_>) = all.into_iter().unzip();
         let row = Row {
-            clean: clean.into_iter().flatten().collect(),
+            clean,
             with_effect: with_effect.into_iter().flatten().collect(),
         };
         eprintln!("# {}: {:.0} s", kind.name(), began.elapsed().as_secs_f64());
         println!("{}", row.line(&kind.name()));
         rows.push(row);
     }
-    let mut by_effect: BTreeMap<(bool, &str), Vec<&WithEffect>> = BTreeMap::new();
-    for (kind, row) in kinds.iter().zip(&rows) {
-        for with_effect in &row.with_effect {
-            let place = (kind.is_sized(), with_effect.id.as_str());
-            by_effect.entry(place).or_default().push(with_effect);
-        }
+    let mut by_effect: BTreeMap<&str, Vec<&WithEffect>> = BTreeMap::new();
+    for with_effect in rows.iter().flat_map(|row| &row.with_effect) {
+        let of_effect = by_effect.entry(&with_effect.id).or_default();
+        of_effect.push(with_effect);
     }
     println!(
         "\n| effect, % | sessions | {POWER} |\n|---|{}",
         "---:|".repeat(5)
     );
-    for ((sized, id), all) in by_effect {
-        let sized = if sized { ", of a given size" } else { "" };
-        println!("| `{id}`{sized} | {} | {} |", all.len(), power(&all));
+    for (id, all) in by_effect {
+        println!("| `{id}` | {} | {} |", all.len(), power(&all));
     }
     eprintln!("# all: {:.0} s", started.elapsed().as_secs_f64());
 }
@@ -171,20 +168,18 @@ pub fn array() {
 }
 
 /// What is said of a session, with the reasons of what is wrong.
-fn told(kind: &Kind, seed: u64, clean: Option<&Clean>, with: Option<&WithEffect>) -> String {
+fn told(kind: &Kind, seed: u64, clean: &Clean, with: Option<&WithEffect>) -> String {
     let objection = |what: &str, judged: Option<&Judged>, wrong: bool| match judged {
         None => String::new(),
         Some(j) if wrong => format!("; {what} {} ({})", j.name(), j.reason),
         Some(j) => format!("; {what} {}", j.name()),
     };
     let mut out = format!("{}, seed {seed}", kind.name());
-    if let Some(clean) = clean {
-        for (what, judged) in [
-            ("clean", Some(&clean.judged)),
-            ("verified", clean.verified.as_ref()),
-        ] {
-            out += &objection(what, judged, judged.is_some_and(|j| !j.is_unobjected()));
-        }
+    for (what, judged) in [
+        ("clean", Some(&clean.judged)),
+        ("verified", clean.verified.as_ref()),
+    ] {
+        out += &objection(what, judged, judged.is_some_and(|j| !j.is_unobjected()));
     }
     if let Some(with) = with {
         out += &format!("; `{}` of {:.2}", with.id, with.strength);

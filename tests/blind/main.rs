@@ -5,15 +5,11 @@
 //!
 //! | | |
 //! |---|---|
-//! | `blind by-hand SEEDS CLEAN [NAME...]` | the same for units by hand, for each grade; then `slow-bias` |
-//! | `blind slow-bias SEEDS [NAME...]` | biases that follow time or temperature, at once or with a lag, for each grade |
-//! | `blind turning SEEDS CLEAN [NAME...]` | the first, on a plan that also turns gravity through the unit |
+//! | `blind by-hand SEEDS CLEAN [NAME...]` | the same for units by hand, for each grade |
 //! | `blind joint SETS [FIRST]` | 2 to 9 sessions of one unit diagnosed together, and their file on another session; seeds from FIRST on |
 //! | `blind earth RUNS [NAME...]` | the Earth's rate in the biases of gyros on a table, with the latitude and without it |
-//! | `blind joint-warm-up SETS FIRST SESSIONS` | the same for digital units by hand, whose only effect is a warm-up of the accelerometer |
 //! | `blind judged SESSIONS [NAME...]` | judgements of clean sessions of each kind, and of sessions with an effect of five times the noise: false alarms and power; NAMEs select kinds |
 //! | `blind judged array` | judgements of an array of eight units, recorded by other people in nine sessions, with a planted quadratic and without it |
-//! | `blind joint-cubics SETS FIRST [NAME...]` | one session by hand of accelerometers with a cubic of four sizes: its coefficients, and the file on another session |
 //! | `blind planted SEEDS TIMES [NAME...]` | each effect planted SEEDS times, at TIMES the size of data sheets, in recordings by other people; NAMEs also select recordings |
 
 mod by_hand;
@@ -21,12 +17,11 @@ mod earth;
 mod joint;
 mod judged;
 mod planted;
-mod slow_bias;
 
 use std::collections::BTreeMap;
 
 use mimu_rig::effects::specs;
-use mimu_tests::blind::{Case, case_on, is_listed, plan, turning_plan};
+use mimu_tests::blind::{Case, case_on, is_listed, plan};
 use rayon::prelude::*;
 
 /// Pairs of effects, in one sensor and in both.
@@ -114,13 +109,9 @@ const HEAD: &str = "| | cases | detected | named right | right and more | named 
 fn main() {
     let mut args: Vec<String> = std::env::args().skip(1).collect();
     let in_hands = args.first().is_some_and(|a| a == "by-hand");
-    let turning = args.first().is_some_and(|a| a == "turning");
     let joint = args.first().is_some_and(|a| a == "joint");
-    let joint_warm_up = args.first().is_some_and(|a| a == "joint-warm-up");
-    let cubics = args.first().is_some_and(|a| a == "joint-cubics");
-    let slow = args.first().is_some_and(|a| a == "slow-bias");
     let planted = args.first().is_some_and(|a| a == "planted");
-    if in_hands || turning || slow || joint || joint_warm_up || cubics || planted {
+    if in_hands || joint || planted {
         args.remove(0);
     }
     if args.first().is_some_and(|a| a == "earth") {
@@ -138,29 +129,16 @@ fn main() {
     }
     let number = |k: usize, default| args.get(k).and_then(|s| s.parse().ok()).unwrap_or(default);
     let (seeds, clean): (u64, u64) = (number(0, 20), number(1, 200));
-    if joint || joint_warm_up {
-        let sessions = number(2, 3) as usize;
-        return joint::run(
-            number(0, 100),
-            number(1, 0),
-            joint_warm_up.then_some(sessions),
-        );
+    if joint {
+        return joint::run(number(0, 100), number(1, 0));
     }
     let chosen: Vec<&str> = args.iter().skip(2).map(String::as_str).collect();
-    if cubics {
-        return joint::run_cubics(number(0, 12), number(1, 0), &chosen);
-    }
     if planted {
         let times = args.get(1).and_then(|s| s.parse().ok()).unwrap_or(1.0);
         return planted::run(number(0, 1), times, &chosen);
     }
     if in_hands {
-        by_hand::run(seeds, clean, &chosen);
-        return slow_bias::run(seeds, &chosen);
-    }
-    if slow {
-        let chosen: Vec<&str> = args.iter().skip(1).map(String::as_str).collect();
-        return slow_bias::run(seeds, &chosen);
+        return by_hand::run(seeds, clean, &chosen);
     }
     let mut kinds: Vec<Vec<&str>> = specs().map(|s| vec![s.id]).collect();
     kinds.extend(PAIRS.iter().map(|p| p.to_vec()));
@@ -173,12 +151,7 @@ fn main() {
         .into_par_iter()
         .map(|(ids, seed)| {
             let name = ids.join(" + ");
-            let plan = if turning {
-                turning_plan(seed)
-            } else {
-                plan(seed)
-            };
-            let case = case_on(&plan, &ids, seed);
+            let case = case_on(&plan(seed), &ids, seed);
             if !chosen.is_empty() {
                 println!("{name}, seed {seed}: {case:?}");
             }

@@ -178,35 +178,12 @@ fn decompositions() -> Table {
         "non-orthogonality, rad",
     ]);
     let made = |angles| forward(&FANG_TABLE_3.forward(angles, [0.0; 3]));
+    #[rustfmt::skip]
     let cases = [
-        (
-            "(16)",
-            ideal::Angles::Linear,
-            "small angles",
-            Angles::Small,
-            table_3(),
-        ),
-        (
-            "(14), products kept",
-            ideal::Angles::Small,
-            "small angles",
-            Angles::Small,
-            table_3(),
-        ),
-        (
-            "rotations",
-            ideal::Angles::Exact,
-            "small angles",
-            Angles::Small,
-            table_3(),
-        ),
-        (
-            "rotations",
-            ideal::Angles::Exact,
-            "rotations",
-            Angles::Exact,
-            table_3_of_axes(),
-        ),
+        ("(16)", ideal::Angles::Linear, "small angles", Angles::Small, table_3()),
+        ("(14), products kept", ideal::Angles::Small, "small angles", Angles::Small, table_3()),
+        ("rotations", ideal::Angles::Exact, "small angles", Angles::Small, table_3()),
+        ("rotations", ideal::Angles::Exact, "rotations", Angles::Exact, table_3_of_axes()),
     ];
     for (how, angles, apart, decomposition, truth) in cases {
         let found = physical(&made(angles), decomposition);

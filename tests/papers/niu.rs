@@ -170,27 +170,12 @@ struct Direction {
 }
 
 /// The two directions of each kind of test.
+#[rustfmt::skip]
 const DIRECTIONS: [Direction; 4] = [
-    Direction {
-        name: "accelerometers, axis up (Table 8), µg",
-        input: 1e6,
-        names: ["b_a", "δs_a", "accel"],
-    },
-    Direction {
-        name: "axis down (5.1), µg",
-        input: -1e6,
-        names: ["b_a", "δs_a", "accel"],
-    },
-    Direction {
-        name: "gyros at +10 deg/s, deg/h",
-        input: RATE,
-        names: ["b_g", "δs_g", "gyro"],
-    },
-    Direction {
-        name: "at -10 deg/s, deg/h",
-        input: -RATE,
-        names: ["b_g", "δs_g", "gyro"],
-    },
+    Direction { name: "accelerometers, axis up (Table 8), µg", input: 1e6, names: ["b_a", "δs_a", "accel"], },
+    Direction { name: "axis down (5.1), µg", input: -1e6, names: ["b_a", "δs_a", "accel"], },
+    Direction { name: "gyros at +10 deg/s, deg/h", input: RATE, names: ["b_g", "δs_g", "gyro"], },
+    Direction { name: "at -10 deg/s, deg/h", input: -RATE, names: ["b_g", "δs_g", "gyro"], },
 ];
 
 /// Rms distance over the axes between the raw mean by Table 9 and the printed one, for each direction of the tests; MTi-G, NV-IMU100, both.
@@ -266,32 +251,14 @@ fn noise_of_a_scheme() -> Table {
         "by formula",
         "simulated",
     ]);
-    for (name, printed, formula, simulated) in [
-        (
-            "bias, all eight positions, deg/h",
-            "about 20",
-            bias(8.0),
-            all.sqrt() * 3600.0,
-        ),
-        (
-            "b_x, b_y by (a.7), two positions, deg/h",
-            "-",
-            bias(2.0),
-            pair.sqrt() * 3600.0,
-        ),
-        (
-            "b_z by (a.8), one position, deg/h",
-            "-",
-            bias(1.0),
-            single.sqrt() * 3600.0,
-        ),
-        (
-            "scale factor, one turn each way, ppm",
-            "about 1200",
-            by_formula,
-            scale.sqrt() * 1e6,
-        ),
-    ] {
+    #[rustfmt::skip]
+    let cases = [
+        ("bias, all eight positions, deg/h", "about 20", bias(8.0), all.sqrt() * 3600.0),
+        ("b_x, b_y by (a.7), two positions, deg/h", "-", bias(2.0), pair.sqrt() * 3600.0),
+        ("b_z by (a.8), one position, deg/h", "-", bias(1.0), single.sqrt() * 3600.0),
+        ("scale factor, one turn each way, ppm", "about 1200", by_formula, scale.sqrt() * 1e6),
+    ];
+    for (name, printed, formula, simulated) in cases {
         let figures = [formula, simulated].map(significant);
         table.row(
             [name.to_string(), printed.to_string()]

@@ -57,6 +57,12 @@ pub fn parameters(model: &AffineFile) -> SVector<f64, 12> {
     mimu::triad::vector(&matrix, &Vector3::from(model.bias))
 }
 
+/// The unit that the numbers of this seed and name draw, clean.
+pub fn drawn(seed: u64, name: &str) -> RigFile {
+    let mut random = Random::new(seed, name);
+    clean(gyro(&mut random), accel(&mut random))
+}
+
 /// A unit of the usual parts with their noise and the given affine models, on a table without flaws. The only remaining errors are noise.
 pub fn clean(gyro: AffineFile, accel: AffineFile) -> RigFile {
     let mut file = RigFile {

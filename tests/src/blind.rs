@@ -83,9 +83,7 @@ fn written_plan(seed: u64, turning: bool) -> String {
 
 /// A unit with the effects `ids`. The size of each is drawn from a log-uniform distribution over a decade around the data-sheet size.
 pub fn unit(ids: &[&str], seed: u64) -> RigFile {
-    let mut random = Random::new(seed, "unit");
-    let (gyro, accel) = (bench::gyro(&mut random), bench::accel(&mut random));
-    let file = bench::clean(gyro, accel);
+    let file = bench::drawn(seed, "unit");
     with_effects(file, ids, seed)
 }
 

@@ -17,17 +17,10 @@ use crate::bench;
 use crate::blind::{reported, with_effects};
 
 /// Effects that a few minutes by hand can show: hands have no steady rate, and the temperature does not go up and down.
+#[rustfmt::skip]
 pub const SHOWN: [&str; 10] = [
-    "gyro_g_sensitivity",
-    "gyro_scale_quadratic",
-    "gyro_scale_cubic",
-    "gyro_scale_asymmetry",
-    "gyro_bias_drift",
-    "gyro_warm_up",
-    "accel_scale_quadratic",
-    "accel_scale_cubic",
-    "accel_bias_drift",
-    "accel_warm_up",
+    "gyro_g_sensitivity", "gyro_scale_quadratic", "gyro_scale_cubic", "gyro_scale_asymmetry", "gyro_bias_drift", "gyro_warm_up",
+    "accel_scale_quadratic", "accel_scale_cubic", "accel_bias_drift", "accel_warm_up",
 ];
 
 /// Grade of the sensors.

@@ -159,9 +159,7 @@ pub fn with_a_table(runs: u64, dwells: Dwells) -> Vec<Tally> {
     }
     over(runs, &empty, |seed, tallies| {
         let plan = bench::table_plan((dwells == Dwells::Randomised).then_some(seed));
-        let mut random = Random::new(seed, "unit");
-        let (gyro, accel) = (bench::gyro(&mut random), bench::accel(&mut random));
-        let file = bench::clean(gyro, accel);
+        let file = bench::drawn(seed, "unit");
         let truths = of_the_session(&plan, &file, seed);
         let mut prepared = bench::recorded(&plan, &file, seed);
         if dwells == Dwells::AsListedWithNoise {
@@ -186,9 +184,7 @@ pub fn with_turning_inputs(runs: u64) -> (Vec<Tally>, [Vec<f64>; 2]) {
     let delays = Mutex::new([Vec::new(), Vec::new()]);
     let tallies = over(runs, &empty, |seed, tallies| {
         let plan = bench::turning_plan(seed);
-        let mut random = Random::new(seed, "unit");
-        let (gyro, accel) = (bench::gyro(&mut random), bench::accel(&mut random));
-        let file = bench::clean(gyro, accel);
+        let file = bench::drawn(seed, "unit");
         let truths = of_the_session(&plan, &file, seed);
         let unit = RigTruth::resolve(&file, seed).expect("a rig").unit;
         let fitted = fit(
@@ -228,9 +224,7 @@ pub fn by_hand(runs: u64, quiet: bool) -> Vec<Tally> {
     ];
     let plan = bench::hand_plan(30);
     over(runs, &empty, |seed, tallies| {
-        let mut random = Random::new(seed, "unit");
-        let (gyro, accel) = (bench::gyro(&mut random), bench::accel(&mut random));
-        let mut file = bench::clean(gyro, accel);
+        let mut file = bench::drawn(seed, "unit");
         if quiet {
             file.unit.gyro_axes.white_si = Some([0.005f64.to_radians(); 3]);
             file.unit.gyro_axes.instability_si = Some([0.0; 3]);

@@ -73,8 +73,6 @@ pub struct Case {
     pub set: Set,
     /// Accepted effects, each with those that the recordings do not distinguish from it.
     pub found: Vec<Vec<String>>,
-    /// Effects that were tried and not accepted, with the reasons.
-    pub rejected: Vec<String>,
     /// Those of the unit that the file contains.
     pub effects: Vec<FittedEffect>,
     /// Verdict, or why the set was refused.
@@ -411,7 +409,6 @@ pub fn case(set: &Set) -> Case {
     let mut case = Case {
         set: set.clone(),
         found: Vec::new(),
-        rejected: Vec::new(),
         effects: Vec::new(),
         verdict: String::new(),
         as_written: None,
@@ -453,10 +450,6 @@ fn judge(case: &mut Case) -> Result<()> {
                 .chain(alike)
                 .collect()
         })
-        .collect();
-    let rejected = diagnosis.sensors.iter().flat_map(|s| &s.decision.rejected);
-    case.rejected = rejected
-        .map(|r| format!("{}: {}", r.id, r.reason))
         .collect();
     let mut effects: Vec<FittedEffect> = Vec::new();
     for accepted in accepted.filter(|a| a.of_unit) {

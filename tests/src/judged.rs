@@ -67,15 +67,6 @@ pub enum Setting {
     Ramp,
 }
 
-/// The effects of the units that are not clean.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Planted {
-    /// One of these, by the seed, of the strength [`STRENGTH`].
-    Strong(&'static [&'static str]),
-    /// This one of this size along each axis, in the unit of its parameter; there are no clean sessions.
-    Sized(&'static str, f64),
-}
-
 /// A kind of sessions: a row of the table.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Kind {
@@ -83,18 +74,18 @@ pub struct Kind {
     pub setting: Setting,
     /// With which unit. Several sessions are of a consumer unit, a ramp of an analog one, slow turns of a quiet gyro.
     pub grade: Grade,
-    /// Its effects.
-    pub planted: Planted,
+    /// The effects of the units that are not clean: one of these, by the seed, of the strength [`STRENGTH`].
+    pub planted: &'static [&'static str],
 }
 
-const POSES: Planted = Planted::Strong(&[
+const POSES: &[&str] = &[
     "accel_scale_quadratic",
     "gyro_g_sensitivity",
     "accel_scale_cubic",
     "gyro_bias_drift",
-]);
-const TURNS: Planted = Planted::Strong(&["gyro_g_sensitivity", "gyro_bias_drift"]);
-const LASTING: Planted = Planted::Strong(&["accel_scale_quadratic", "gyro_g_sensitivity"]);
+];
+const TURNS: &[&str] = &["gyro_g_sensitivity", "gyro_bias_drift"];
+const LASTING: &[&str] = &["accel_scale_quadratic", "gyro_g_sensitivity"];
 
 impl Kind {
     /// All.
@@ -135,17 +126,6 @@ impl Kind {
             (Setting::Sessions(Life::Constant), Grade::Consumer, LASTING),
             (Setting::Sessions(Life::PowerOn), Grade::Consumer, LASTING),
             (Setting::Ramp, Grade::Analog, LASTING),
-            (
-                by_hand(24, 100.0, false),
-                Grade::Consumer,
-                Planted::Sized("accel_scale_quadratic", 5.0),
-            ),
-            // 0.3 deg/s a minute.
-            (
-                by_hand(24, 100.0, false),
-                Grade::Consumer,
-                Planted::Sized("gyro_bias_drift", 18.0),
-            ),
         ];
         all.extend(others.map(|(setting, grade, planted)| Self {
             setting,
@@ -158,7 +138,7 @@ impl Kind {
     /// In words.
     pub fn name(&self) -> String {
         let grade = format!("{:?}", self.grade).to_lowercase();
-        let setting = match self.setting {
+        match self.setting {
             Setting::ByHand {
                 poses,
                 rate_hz,
@@ -172,16 +152,7 @@ impl Kind {
             Setting::SlowTurns => "24 turns of 8 s, quiet gyro, latitude 48".into(),
             Setting::Sessions(life) => format!("4 sessions, {}", life.name()),
             Setting::Ramp => "ramp".into(),
-        };
-        match self.planted {
-            Planted::Strong(_) => setting,
-            Planted::Sized(id, size) => format!("{setting}, `{id}` of {size}"),
         }
-    }
-
-    /// Whether its effect has a given size, and there are no clean sessions.
-    pub fn is_sized(&self) -> bool {
-        matches!(self.planted, Planted::Sized(..))
     }
 
     fn unit(&self, seed: u64) -> RigFile {
@@ -333,27 +304,24 @@ impl Kind {
         sums
     }
 
-    /// A clean unit calibrated and verified; `None` if the kind has none.
-    pub fn clean(&self, seed: u64) -> Option<Clean> {
-        if self.is_sized() {
-            return None;
-        }
+    /// A clean unit calibrated and verified.
+    pub fn clean(&self, seed: u64) -> Clean {
         let calibrated = match self.calibrated(self.all_recorded(&[], seed)) {
             Ok(calibrated) => calibrated,
             Err(refusal) => {
-                return Some(Clean {
+                return Clean {
                     judged: Judged::refused(refusal),
                     inside: [[0; 2]; 2],
                     verified: None,
-                });
+                };
             }
         };
         let second = self.recorded(&[], seed, SECOND);
-        Some(Clean {
+        Clean {
             inside: self.inside(&calibrated, seed),
             verified: Some(Judged::of_verify(&second, &calibrated.calibration)),
             judged: calibrated.judgement.into(),
-        })
+        }
     }
 
     /// Rms that an effect leaves after the affine fit, over the noise, for the sensor with this effect. Not a number if one of the recordings is refused.
@@ -382,18 +350,10 @@ impl Kind {
 
     /// The effect of the unit `seed`, and its strength in the first recording; `None` if no size has it.
     fn planted(&self, seed: u64) -> Option<(EffectFile, f64)> {
-        let (id, times) = match self.planted {
-            Planted::Strong(ids) => (ids[seed as usize % ids.len()], None),
-            Planted::Sized(id, size) => (id, Some(size)),
-        };
+        let id = self.planted[seed as usize % self.planted.len()];
         let mut effect = with_effects(RigFile::default(), &[id], seed)
             .effect
             .swap_remove(0);
-        if let Some(size) = times {
-            let key = mimu_rig::effects::spec(id).expect("an effect").parameters[0].key;
-            let axes = vec![toml::Value::Float(size); 3];
-            effect.parameters.insert(key.into(), axes.into());
-        }
         let sensor = match id.starts_with("gyro") {
             true => Sensor::Gyro,
             false => Sensor::Accel,
@@ -403,7 +363,7 @@ impl Kind {
             let with = self.recorded(std::slice::from_ref(&effect), seed, 0);
             let strength = self.strength(sensor, &with, &without);
             let over = STRENGTH / strength;
-            if times.is_some() || (over - 1.0).abs() <= DEPARTURE {
+            if (over - 1.0).abs() <= DEPARTURE {
                 return Some((effect, strength));
             }
             // One that is refused is too large.

@@ -37,7 +37,6 @@ pub mod judged;
 pub mod niu;
 pub mod noise_in_use;
 pub mod page;
-pub mod peers;
 pub mod planted;
 pub mod ramp;
 pub mod recordings;
@@ -47,3 +46,11 @@ pub mod spinner;
 pub mod stored_calibration;
 pub mod text_board;
 pub mod whole_turns;
+
+/// Checks that `text` contains all these words.
+#[track_caller]
+pub fn says(text: &str, words: &[&str]) {
+    for word in words {
+        assert!(text.contains(word), "{word:?} is not in: {text}");
+    }
+}

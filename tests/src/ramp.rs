@@ -1,6 +1,5 @@
 //! Units on a table in a chamber whose temperature goes up and down.
 
-use mimu_rig::random::Random;
 use mimu_rig::rig_file::RigFile;
 use nalgebra::Vector3;
 
@@ -27,9 +26,7 @@ pub fn plan(rounds: u32, dwell_s: f64, chamber_c: &[[f64; 2]]) -> String {
 
 /// A unit of the usual parts, warmed up, whose die is at the temperature of its board.
 pub fn unit(seed: u64) -> RigFile {
-    let mut random = Random::new(seed, "unit");
-    let (gyro, accel) = (bench::gyro(&mut random), bench::accel(&mut random));
-    let mut file = bench::clean(gyro, accel);
+    let mut file = bench::drawn(seed, "unit");
     file.thermal.on_before_s = Some(f64::INFINITY);
     file.thermal.board_lag_s = Some(60.0);
     file.thermal.die_lag_s = Some([1.0; 4]);

@@ -7,7 +7,7 @@ use mimu_rig::random::Random;
 use mimu_rig::rig_file::{EffectFile, RigFile};
 use mimu_rig::unit::TemperatureSensor;
 
-use crate::by_hand::{Case, Grade, case_of, plan, unit};
+use crate::by_hand::{Grade, plan, unit};
 
 /// What moves the bias, and what else happens in the recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -173,11 +173,5 @@ impl Kind {
             _ => {}
         }
         table
-    }
-
-    /// Records and diagnoses a unit of `grade`.
-    pub fn case(self, grade: Grade, seed: u64) -> Case {
-        let file = self.unit(grade, seed);
-        case_of(&file, self.effects(), &self.plan(seed), grade, seed, false)
     }
 }

@@ -30,32 +30,13 @@ enum Model {
     OneTemperature,
 }
 
+#[rustfmt::skip]
 const ROWS: [(&str, Estimator, Model); 6] = [
-    (
-        "all 18 scalars of a triad, at one temperature",
-        Estimator::Classic(Classic::Soak),
-        Model::OneTemperature,
-    ),
-    (
-        "(33), (34) as printed (`soak-fang`)",
-        Estimator::Classic(Classic::SoakAsPrinted),
-        Model::AsFitted,
-    ),
-    (
-        "the same, with M of one temperature",
-        Estimator::Classic(Classic::SoakAsPrinted),
-        Model::WithM,
-    ),
-    (
-        "(31), (32) with M constant (`soak-constant-m`)",
-        Estimator::Classic(Classic::SoakConstantM),
-        Model::AsFitted,
-    ),
-    (
-        "all 18 scalars of each plateau (`soak`)",
-        Estimator::Classic(Classic::Soak),
-        Model::AsFitted,
-    ),
+    ("all 18 scalars of a triad, at one temperature", Estimator::Classic(Classic::Soak), Model::OneTemperature),
+    ("(33), (34) as printed (`soak-fang`)", Estimator::Classic(Classic::SoakAsPrinted), Model::AsFitted),
+    ("the same, with M of one temperature", Estimator::Classic(Classic::SoakAsPrinted), Model::WithM),
+    ("(31), (32) with M constant (`soak-constant-m`)", Estimator::Classic(Classic::SoakConstantM), Model::AsFitted),
+    ("all 18 scalars of each plateau (`soak`)", Estimator::Classic(Classic::Soak), Model::AsFitted),
     ("`joint`", Estimator::Joint, Model::AsFitted),
 ];
 

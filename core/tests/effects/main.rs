@@ -202,7 +202,6 @@ fn what_one_evaluation_a_sample_leaves_is_far_below_the_noise_of_a_sample() {
     let bent =
         |x: &Vector3<f64>| x.map(|x| 1e-3 * (x / range * x + (x / range).powi(2) * x + x.max(-x)));
     let (worst, largest) = left_of_a_stream("gyro", &effects, sines(range, 40.0), bent);
-    println!("gyro: {worst:.1e} of {largest:.1e} rad/s are left, noise {noise:.1e} rad/s");
     assert!(largest > 0.9 * noise && worst < 0.002 * noise);
 
     // MMA7260QT: 1.5 g, 1 % nonlinearity, 4.7 mV of noise at 0.8 V/g. The error is the same along and across, and the input moves through the range
@@ -218,7 +217,6 @@ fn what_one_evaluation_a_sample_leaves_is_far_below_the_noise_of_a_sample() {
         x.map(|x| 0.01 * x * x / range + 0.01 / 3.0 * across / range)
     };
     let (worst, largest) = left_of_a_stream("accel", &effects, sines(range, 40.0), bent);
-    println!("accelerometer: {worst:.1e} of {largest:.1e} m/s² are left, noise {noise:.1e} m/s²");
     assert!(largest > 1.5 * noise && worst < 0.01 * noise);
 
     // At rest the error is removed completely.
@@ -591,15 +589,5 @@ proptest! {
             // Angular accelerations reach 4000 rad/s², so errors reach 80 m/s². Over 20 000 cases the largest difference was 1.1e-5.
             prop_assert!((a - b).abs() < 3e-5, "{a} {b}");
         }
-    }
-
-    #[test]
-    fn readings_far_beyond_any_sensor_stay_finite(
-        c in prop::array::uniform9(-9.0..9.0),
-        inputs in prop::collection::vec(prop::array::uniform6(-1e6..1e6), 1..4),
-        temp_c in -300.0..1000.0,
-    ) {
-        let single = all_at_once!(f32, c, inputs, temp_c);
-        prop_assert!(single.iter().all(|v| v.is_finite()));
     }
 }

@@ -291,7 +291,8 @@ fn axis() -> String {
 
 #[test]
 fn refusals() {
-    for (refusal, bytes) in [
+    #[rustfmt::skip]
+    let cases = [
         (Refusal::Unknown, "00"),
         (Refusal::NoCalibration, "01"),
         (Refusal::NoUpload, "02"),
@@ -299,33 +300,15 @@ fn refusals() {
         (Refusal::WrongOffset { expected: 300 }, "04 ac02"),
         (Refusal::Incomplete { received: 5 }, "05 05"),
         (Refusal::WrongHash { found: 128 }, "06 8001"),
-        (
-            Refusal::NotUsable(stored::StoredError::NotACalibration),
-            "07 00",
-        ),
+        (Refusal::NotUsable(stored::StoredError::NotACalibration), "07 00"),
         (Refusal::NotUsable(stored::StoredError::Length), "07 01"),
-        (
-            Refusal::NotUsable(stored::StoredError::Version { found: 300 }),
-            "07 02 ac02",
-        ),
+        (Refusal::NotUsable(stored::StoredError::Version { found: 300 }), "07 02 ac02"),
         (Refusal::NotUsable(stored::StoredError::Check), "07 03"),
-        (
-            Refusal::NotUsable(stored::StoredError::Node { at: 200 }),
-            "07 04 c8",
-        ),
+        (Refusal::NotUsable(stored::StoredError::Node { at: 200 }), "07 04 c8"),
         (Refusal::NotUsable(stored::StoredError::Singular), "07 05"),
-        (
-            Refusal::NotUsable(stored::StoredError::EffectUnknown { at: 1 }),
-            "07 06 01",
-        ),
-        (
-            Refusal::NotUsable(stored::StoredError::EffectValue { at: 2 }),
-            "07 07 02",
-        ),
-        (
-            Refusal::NotUsable(stored::StoredError::EffectsFull { at: 3 }),
-            "07 08 03",
-        ),
+        (Refusal::NotUsable(stored::StoredError::EffectUnknown { at: 1 }), "07 06 01"),
+        (Refusal::NotUsable(stored::StoredError::EffectValue { at: 2 }), "07 07 02"),
+        (Refusal::NotUsable(stored::StoredError::EffectsFull { at: 3 }), "07 08 03"),
         (Refusal::FlashFailed, "08"),
         (Refusal::NoBank, "09"),
         (Refusal::BadNumber, "0a"),
@@ -338,7 +321,8 @@ fn refusals() {
         ),
         (Refusal::SupplyLow, "0d"),
         (Refusal::BanksSwapped, "0e"),
-    ] {
+    ];
+    for (refusal, bytes) in cases {
         let bytes = hex(&format!("02 03 {bytes}"));
         frozen(Message::Refused { id: 3, refusal }, &bytes);
     }

@@ -40,6 +40,8 @@ mod separator;
 mod staging;
 #[cfg(feature = "parquet")]
 mod strict_file;
+#[cfg(test)]
+mod tests;
 mod toml_file;
 mod turntable;
 mod unit_name;

@@ -6,6 +6,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::error::{Error, Result};
+use crate::tests::says;
 
 fn manifest() -> Manifest {
     Manifest::new("unit-007", 1000.0, 9.80665, RawUnit::Volt, Reference::Table)
@@ -254,10 +255,7 @@ fn a_directory_that_is_no_recording_says_why() {
     let nowhere = Recording::open(&folder.path().join("x"))
         .unwrap_err()
         .to_string();
-    assert!(
-        nowhere.contains("there is no such file or directory"),
-        "{nowhere}"
-    );
+    says(&nowhere, &["there is no such file or directory"]);
     let file = Recording::open(&folder.path().join(MANIFEST_FILE))
         .unwrap_err()
         .to_string();

@@ -257,38 +257,19 @@ fn late_on_a_ramp(thermal: &str) -> (f64, f64, [f64; 4]) {
 
 #[test]
 fn a_die_may_be_behind_the_thermometer_or_ahead_of_it_by_a_lag_that_the_truth_gives() {
-    for (thermal, lag_s) in [
+    #[rustfmt::skip]
+    let cases = [
         // A thermometer on the board: the die lags it by its own lag.
-        (
-            "temperature = \"board\" | board_lag_s = 300\ndie_lag_s = [150, 5, 5, 5]",
-            150.0,
-        ),
+        ("temperature = \"board\" | board_lag_s = 300\ndie_lag_s = [150, 5, 5, 5]", 150.0),
         // A thermometer with its own package on the same board: the die leads.
-        (
-            "temperature = \"board\"\ntemperature_lag_s = 200 | board_lag_s = 300\ndie_lag_s = [20, 5, 5, 5]",
-            -180.0,
-        ),
-        (
-            "temperature = \"gyro_x\" | board_lag_s = 300\ndie_lag_s = [150, 5, 5, 5]",
-            0.0,
-        ),
-        (
-            "temperature = \"gyro_y\" | board_lag_s = 300\ndie_lag_s = [150, 40, 5, 5]",
-            110.0,
-        ),
-        (
-            "temperature = \"gyro_z\" | board_lag_s = 300\ndie_lag_s = [10, 5, 70, 5]",
-            -60.0,
-        ),
-        (
-            "temperature = \"accel\" | board_lag_s = 300\ndie_lag_s = [10, 5, 5, 30]",
-            -20.0,
-        ),
-        (
-            "temperature = \"dies\" | board_lag_s = 300\ndie_lag_s = [90, 30, 60, 30]",
-            30.0,
-        ),
-    ] {
+        ("temperature = \"board\"\ntemperature_lag_s = 200 | board_lag_s = 300\ndie_lag_s = [20, 5, 5, 5]", -180.0),
+        ("temperature = \"gyro_x\" | board_lag_s = 300\ndie_lag_s = [150, 5, 5, 5]", 0.0),
+        ("temperature = \"gyro_y\" | board_lag_s = 300\ndie_lag_s = [150, 40, 5, 5]", 110.0),
+        ("temperature = \"gyro_z\" | board_lag_s = 300\ndie_lag_s = [10, 5, 70, 5]", -60.0),
+        ("temperature = \"accel\" | board_lag_s = 300\ndie_lag_s = [10, 5, 5, 30]", -20.0),
+        ("temperature = \"dies\" | board_lag_s = 300\ndie_lag_s = [90, 30, 60, 30]", 30.0),
+    ];
+    for (thermal, lag_s) in cases {
         let (temp_c, bias, given) = late_on_a_ramp(thermal);
         near(given[0], lag_s, 1e-9);
         // The bias shows the temperature of the die.
@@ -326,32 +307,19 @@ fn a_thermometer_that_sticks_or_jumps_leaves_everything_else_as_it_was() {
 
 #[test]
 fn what_is_wrong_with_curves_and_thermometer_is_named_with_its_line() {
-    for (text, complaint) in [
-        (
-            "[curves.gyro]\nbias_mg = [[0, 0, 0, 0]]",
-            "3: unknown field `bias_mg`, expected one of `bias_deg_per_h`",
-        ),
-        (
-            "[curves.gyro]\nhysteresis_width_c = 0",
-            "3: `hysteresis_width_c` is 0; give 0.01 to 300",
-        ),
-        (
-            "[curves.accel]\npower_on_sigma_mg = [1, -1, 1]",
-            "3: `power_on_sigma_mg` is -1; give 0 to 1000000",
-        ),
+    #[rustfmt::skip]
+    let cases = [
+        ("[curves.gyro]\nbias_mg = [[0, 0, 0, 0]]", "3: unknown field `bias_mg`, expected one of `bias_deg_per_h`"),
+        ("[curves.gyro]\nhysteresis_width_c = 0", "3: `hysteresis_width_c` is 0; give 0.01 to 300"),
+        ("[curves.accel]\npower_on_sigma_mg = [1, -1, 1]", "3: `power_on_sigma_mg` is -1; give 0 to 1000000"),
         (
             "[curves.accel]\nnoise_at_c_raw = [[10, 1, 1, 1], [0, 1, 1, 1]]",
             "3: `noise_at_c_raw`: 0 °C follows 10 °C; give [°C, x, y, z] in order of temperature",
         ),
-        (
-            "[flaws]\nthermometer_sticks_s = [30, 20]",
-            "3: `thermometer_sticks_s` ends at 20 s, before it begins; give [from, to]",
-        ),
-        (
-            "[unit]\ntemperature_lag_s = -1",
-            "3: `temperature_lag_s` is -1; give 0 to 1000000",
-        ),
-    ] {
+        ("[flaws]\nthermometer_sticks_s = [30, 20]", "3: `thermometer_sticks_s` ends at 20 s, before it begins; give [from, to]"),
+        ("[unit]\ntemperature_lag_s = -1", "3: `temperature_lag_s` is -1; give 0 to 1000000"),
+    ];
+    for (text, complaint) in cases {
         let source = Source::new("RIG.toml", format!("format = \"mimu-rig/1\"\n{text}"));
         let found = RigFile::parse(&source).unwrap_err();
         assert!(found.contains(complaint), "{found}");

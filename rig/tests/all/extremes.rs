@@ -7,22 +7,9 @@ use mimu_rig::plan::Plan;
 use mimu_rig::record::samples;
 use mimu_rig::rig_file::{RigFile, RigTruth};
 
+#[rustfmt::skip]
 const EXTREMES: [&str; 16] = [
-    "nan",
-    "inf",
-    "-inf",
-    "1e308",
-    "-1e308",
-    "1e-308",
-    "5e-324",
-    "-0.0",
-    "0",
-    "1",
-    "-1",
-    "1e9",
-    "-1e9",
-    "1e17",
-    "4294967295",
+    "nan", "inf", "-inf", "1e308", "-1e308", "1e-308", "5e-324", "-0.0", "0", "1", "-1", "1e9", "-1e9", "1e17", "4294967295",
     "9223372036854775807",
 ];
 

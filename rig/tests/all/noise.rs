@@ -54,7 +54,6 @@ fn the_allan_deviation_shows_each_coefficient_as_stated() {
                 sigma[i] = (2.0 / dof[kind] / seeds as f64).sqrt();
             }
         }
-        println!("variance over stated, kind {kind}: {ratio:.4?} +- {sigma:.4?}");
         for i in 0..4 {
             let miss = (ratio[i] - 1.0).abs();
             assert!(

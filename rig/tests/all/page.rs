@@ -55,40 +55,27 @@ fn the_page_has_every_key_of_both_files_and_no_other() {
     let unknown = "a_key_that_nobody_would_ever_give = 1\n";
     let plan = |text: &str| Plan::parse(Source::new("PLAN.toml", text)).unwrap_err();
     let rig = |text: &str| RigFile::parse(&Source::new("RIG.toml", text)).unwrap_err();
-    for (heading, complaint) in [
+    #[rustfmt::skip]
+    let cases = [
         ("Examples: `rig/plans`", plan(unknown)),
         ("`[[step]]`", plan(&format!("[[step]]\n{unknown}"))),
         ("Examples: `rig/rigs`", rig(unknown)),
         ("`[unit]`", rig(&format!("[unit]\n{unknown}"))),
-        (
-            "`[unit.gyro_axes]`",
-            rig(&format!("[unit.gyro_axes]\n{unknown}")),
-        ),
-        (
-            "`[unit.gyro_affine]`",
-            rig(&format!("[unit.gyro_affine]\n{unknown}")),
-        ),
+        ("`[unit.gyro_axes]`", rig(&format!("[unit.gyro_axes]\n{unknown}"))),
+        ("`[unit.gyro_affine]`", rig(&format!("[unit.gyro_affine]\n{unknown}"))),
         ("`[thermal]`", rig(&format!("[thermal]\n{unknown}"))),
         ("`[curves]`", rig(&format!("[curves]\n{unknown}"))),
         ("`[curves.gyro]`", rig(&format!("[curves.gyro]\n{unknown}"))),
-        (
-            "`[curves.accel]`",
-            rig(&format!("[curves.accel]\n{unknown}")),
-        ),
+        ("`[curves.accel]`", rig(&format!("[curves.accel]\n{unknown}"))),
         ("`[history]`", rig(&format!("[history]\n{unknown}"))),
-        (
-            "`[history.power_on]`",
-            rig(&format!("[history.power_on]\n{unknown}")),
-        ),
+        ("`[history.power_on]`", rig(&format!("[history.power_on]\n{unknown}"))),
         ("`[converter]`", rig(&format!("[converter]\n{unknown}"))),
         ("`[table]`", rig(&format!("[table]\n{unknown}"))),
-        (
-            "`[table.settling]`",
-            rig(&format!("[table.settling]\n{unknown}")),
-        ),
+        ("`[table.settling]`", rig(&format!("[table.settling]\n{unknown}"))),
         ("`[hands]`", rig(&format!("[hands]\n{unknown}"))),
         ("`[flaws]`", rig(&format!("[flaws]\n{unknown}"))),
-    ] {
+    ];
+    for (heading, complaint) in cases {
         let documented: BTreeSet<_> = rows(&page, heading).into_iter().flat_map(|r| r.0).collect();
         assert_eq!(documented, known(&complaint), "{heading}");
     }
@@ -98,21 +85,14 @@ fn the_page_has_every_key_of_both_files_and_no_other() {
 fn the_defaults_of_table_hands_and_flaws_are_those_of_the_code() {
     let page = page();
     let settling = toml::Table::try_from(TableTruth::default().settling).unwrap();
-    for (heading, defaults) in [
-        (
-            "`[table]`",
-            toml::Table::try_from(TableTruth::default()).unwrap(),
-        ),
+    #[rustfmt::skip]
+    let cases = [
+        ("`[table]`", toml::Table::try_from(TableTruth::default()).unwrap()),
         ("`[table.settling]`", settling),
-        (
-            "`[hands]`",
-            toml::Table::try_from(HandsTruth::default()).unwrap(),
-        ),
-        (
-            "`[flaws]`",
-            toml::Table::try_from(FlawsTruth::default()).unwrap(),
-        ),
-    ] {
+        ("`[hands]`", toml::Table::try_from(HandsTruth::default()).unwrap()),
+        ("`[flaws]`", toml::Table::try_from(FlawsTruth::default()).unwrap()),
+    ];
+    for (heading, defaults) in cases {
         for (keys, cells) in rows(&page, heading) {
             let key = &keys[0];
             if !defaults[key].is_table() {

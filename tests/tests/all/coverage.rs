@@ -68,9 +68,6 @@ fn on_a_table(unit: &Ideal, random: &mut Random) -> Vec<Observation> {
 /// Recordings of each kind in every run of the tests: enough to detect an interval that contains the truth in only 85 % of the cases.
 const FEW: u64 = 200;
 
-/// The same for the nightly tests; `make papers` uses 1000.
-const MANY: u64 = 400;
-
 #[test]
 fn intervals_hold_the_truth_where_the_input_is_known() {
     with_a_table(FEW, Dwells::Randomised).iter().for_each(judge);
@@ -130,14 +127,6 @@ fn intervals_of_many_hold_the_truth_where_inputs_move_within_dwells() {
     turning_inputs(200);
 }
 
-#[test]
-#[ignore = "nightly: more recordings"]
-fn intervals_of_many_hold_the_truth_where_the_input_is_known() {
-    with_a_table(MANY, Dwells::Randomised)
-        .iter()
-        .for_each(judge);
-}
-
 /// Dwells in the listed order. Without the noise of the unit at rest the share drops to 90 %, because the intervals then lack the wander that
 /// neighbouring dwells share.
 #[test]
@@ -148,23 +137,8 @@ fn intervals_hold_the_truth_of_dwells_that_share_the_wander_where_it_is_known() 
 }
 
 #[test]
-#[ignore = "nightly: more recordings"]
-fn intervals_of_many_hold_the_truth_of_dwells_that_share_the_wander() {
-    with_a_table(MANY, Dwells::AsListedWithNoise)
-        .iter()
-        .for_each(judge);
-}
-
-#[test]
 fn intervals_hold_the_truth_where_only_gravity_is_known() {
     by_hand(FEW / 2, true).iter().for_each(judge);
-}
-
-#[test]
-#[ignore = "nightly: more recordings"]
-fn intervals_of_many_hold_the_truth_where_only_gravity_is_known() {
-    by_hand(MANY, false).iter().for_each(judge);
-    by_hand(MANY, true).iter().for_each(judge);
 }
 
 /// A table that repeats its rates only to 0.1 %, or a bias that wanders: dwells scatter more than the noise, and the intervals must include this.

@@ -1,7 +1,5 @@
 //! Diagnosis of units whose truth is known, and of recordings by other people. `make blind` runs the complete study of the former.
 
-use std::ops::Range;
-
 use mimu::diagnose::decision::CorrelatesWith;
 use mimu::diagnose::search::Alternative;
 use mimu::diagnose::{Diagnosis, Verdict, diagnose};
@@ -12,6 +10,7 @@ use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
 use mimu::signal::stillness::STILL_FACTOR;
 use mimu_recording::Recording;
+use mimu_rig::rig_file::RigFile;
 use mimu_tests::blind::{Case, case, plan, reported, unit};
 use mimu_tests::recordings::{mikoff, xsens};
 use mimu_tests::{bench, by_hand};
@@ -26,91 +25,34 @@ fn cases(ids: &[&str], seeds: u64) -> Vec<Case> {
 
 #[test]
 fn clean_units_are_told_to_be_clean() {
-    clean(2);
-}
-
-#[test]
-#[ignore = "nightly: more seeds"]
-fn eight_clean_units_are_told_to_be_clean() {
-    clean(8);
-}
-
-fn clean(seeds: u64) {
     // `make blind` allows two of its 200 units not to be clean.
-    for case in cases(&[], seeds) {
+    for case in cases(&[], 2) {
         assert_eq!(case.verdict, "clean", "{case:?}");
     }
 }
 
 #[test]
 fn single_effects_and_a_pair_are_named_and_brought_down_to_the_noise() {
-    named_and_removed(
-        &[
-            &["gyro_g_sensitivity"],
-            &["accel_cross_axis_product"],
-            &["gyro_scale_asymmetry", "accel_scale_cubic"],
-        ],
-        1,
-    );
-}
-
-#[test]
-#[ignore = "nightly: more effects and seeds"]
-fn of_more_units_effects_are_named_and_brought_down_to_the_noise() {
-    named_and_removed(
-        &[
-            &["gyro_g_sensitivity"],
-            &["gyro_g_squared"],
-            &["gyro_thermal_bias"],
-            &["accel_scale_quadratic"],
-            &["accel_cross_axis_product"],
-            &["accel_warm_up"],
-            &["gyro_scale_asymmetry", "accel_scale_cubic"],
-        ],
-        2,
-    );
-}
-
-fn named_and_removed(sets: &[&[&str]], seeds: u64) {
-    for ids in sets {
-        for case in cases(ids, seeds) {
-            let sorted = |ids: &[String]| {
-                let mut ids = ids.to_vec();
-                ids.sort();
-                ids
-            };
-            assert_eq!(sorted(&case.found), sorted(&case.truth), "{case:?}");
-            assert!(case.after < 1.5, "{case:?}");
-        }
+    let sets: [&[&str]; 3] = [
+        &["gyro_g_sensitivity"],
+        &["accel_cross_axis_product"],
+        &["gyro_scale_asymmetry", "accel_scale_cubic"],
+    ];
+    for case in sets.iter().flat_map(|ids| cases(ids, 1)) {
+        let sorted = |ids: &[String]| {
+            let mut ids = ids.to_vec();
+            ids.sort();
+            ids
+        };
+        assert_eq!(sorted(&case.found), sorted(&case.truth), "{case:?}");
+        assert!(case.after < 1.5, "{case:?}");
     }
 }
 
 #[test]
 fn what_is_on_no_list_is_told_to_be_unexplained() {
-    unexplained(&["x_accel_stress_hysteresis", "x_supply_coupling"], 1);
-}
-
-#[test]
-#[ignore = "nightly: more causes and seeds"]
-fn of_more_units_what_is_on_no_list_is_told_to_be_unexplained() {
-    unexplained(
-        &[
-            "x_accel_stress_hysteresis",
-            "x_usb_beat",
-            "x_accel_creep",
-            "x_gyro_magnetic",
-            "x_gyro_saturation_recovery",
-            "x_supply_coupling",
-            "gyro_readout_code",
-            "accel_readout_code",
-        ],
-        2,
-    );
-}
-
-fn unexplained(causes: &[&str], seeds: u64) {
-    for id in causes {
-        for case in cases(&[id], seeds) {
+    for id in ["x_accel_stress_hysteresis", "x_supply_coupling"] {
+        for case in cases(&[id], 1) {
             assert_eq!(case.verdict, "unexplained", "{case:?}");
         }
     }
@@ -161,41 +103,27 @@ fn an_alternative_that_no_planned_dwell_distinguishes_is_reported_as_any_other()
     assert!(accepted > 0 && named.sum::<usize>() == accepted);
 }
 
+/// 60 missing codes at a reading.
 #[test]
 fn a_step_at_a_reading_is_left_over_against_the_reading() {
-    step_at_a_reading(&[(0, 0.42)]);
+    let plan = plan(0);
+    let mut file = unit(&["gyro_missing_codes"], 0);
+    let parameters = &mut file.effect[0].parameters;
+    parameters.insert("codes".into(), 60.0.into());
+    parameters.insert("at".into(), 0.42.into());
+    let found = diagnosed_with_noise(&plan, &file, 0);
+    let left = found.sensors.iter().flat_map(|s| &s.decision.leftover);
+    let against: Vec<_> = left.map(|l| &l.against).collect();
+    assert!(against.contains(&&CorrelatesWith::Reading), "{against:?}");
+    assert_eq!(found.verdict, Verdict::Unexplained, "{:?}", found.effects);
 }
 
-#[test]
-#[ignore = "nightly: more units"]
-fn steps_at_readings_are_left_over_against_the_reading() {
-    step_at_a_reading(&[(0, 0.42), (1, 0.55), (2, 0.42), (3, 0.55)]);
-}
-
-/// Seeds of units, each with 60 missing codes at a reading.
-fn step_at_a_reading(units: &[(u64, f64)]) {
-    let mut by_reading = 0;
-    for &(seed, at) in units {
-        let plan = plan(seed);
-        let mut file = unit(&["gyro_missing_codes"], seed);
-        let parameters = &mut file.effect[0].parameters;
-        parameters.insert("codes".into(), 60.0.into());
-        parameters.insert("at".into(), at.into());
-        let recorded = bench::recorded(&plan, &file, seed);
-        let noise = bench::noise_file(&file, seed, recorded.condensed.period_s);
-        let found = diagnose(
-            recorded.with_noise(&noise).unwrap().into(),
-            Options::IN_SAMPLE,
-        )
-        .unwrap();
-        let ids: Vec<String> = found.effects.iter().map(|e| e.candidate.id()).collect();
-        let left = found.sensors.iter().flat_map(|s| &s.decision.leftover);
-        let against: Vec<_> = left.map(|l| &l.against).collect();
-        println!("seed {seed}: {ids:?}, left {against:?}");
-        by_reading += u32::from(against.contains(&&CorrelatesWith::Reading));
-        assert_eq!(found.verdict, Verdict::Unexplained, "seed {seed}: {ids:?}");
-    }
-    assert!(by_reading > 0);
+/// With the noise of the unit at rest.
+fn diagnosed_with_noise(plan: &str, file: &RigFile, seed: u64) -> Diagnosis {
+    let recorded = bench::recorded(plan, file, seed);
+    let noise = bench::noise_file(file, seed, recorded.condensed.period_s);
+    let recorded = recorded.with_noise(&noise).unwrap();
+    diagnose(recorded.into(), Options::IN_SAMPLE).unwrap()
 }
 
 /// The table's axes point up and never down, so the square of a force resembles a small scale factor and misalignment. An affine model that lacks the
@@ -206,13 +134,7 @@ fn a_quadratic_of_five_per_cent_on_a_table_comes_alone_and_at_its_size() {
     let seed = 1;
     let mut file = unit(&["accel_scale_quadratic"], seed);
     file.effect[0].parameters = toml::from_str("mg_per_g2 = [50.0, -40.0, 30.0]").unwrap();
-    let recorded = bench::recorded(&plan(seed), &file, seed);
-    let noise = bench::noise_file(&file, seed, recorded.condensed.period_s);
-    let found = diagnose(
-        recorded.with_noise(&noise).unwrap().into(),
-        Options::IN_SAMPLE,
-    )
-    .unwrap();
+    let found = diagnosed_with_noise(&plan(seed), &file, seed);
     let ids: Vec<String> = found.effects.iter().map(|e| e.candidate.id()).collect();
     assert_eq!(ids, ["accel_scale_quadratic"]);
     let accepted = found.sensors.iter().flat_map(|s| &s.decision.accepted);
@@ -224,11 +146,6 @@ fn a_quadratic_of_five_per_cent_on_a_table_comes_alone_and_at_its_size() {
             one.covariance[(axis, axis)].sqrt(),
         );
         let error = one.effect.values[axis] - truth;
-        println!(
-            "{axis}: {:.2} sigma, {:.2} %",
-            error / sigma,
-            100.0 * error / truth
-        );
         assert!(error.abs() < 4.0 * sigma && error.abs() < 4e-3 * truth.abs());
     }
 }
@@ -236,25 +153,14 @@ fn a_quadratic_of_five_per_cent_on_a_table_comes_alone_and_at_its_size() {
 /// A drift of data-sheet size would not be seen in three minutes; these units drift slightly more.
 #[test]
 fn what_describes_a_weak_drift_by_hand_is_named_with_the_drift() {
-    weak_drift(17..19);
-}
-
-#[test]
-#[ignore = "nightly: more units"]
-fn of_more_units_what_describes_a_weak_drift_by_hand_is_named_with_the_drift() {
-    weak_drift(8..20);
-}
-
-fn weak_drift(seeds: Range<u64>) {
     for (id, grade) in [
         ("accel_bias_drift", by_hand::Grade::Analog),
         ("gyro_bias_drift", by_hand::Grade::Consumer),
     ] {
         let mut found = 0;
-        for seed in seeds.clone() {
+        for seed in 17..19 {
             let case = by_hand::case(&[id], grade, seed, false);
             if !case.found.is_empty() {
-                println!("{id}: found with seed {seed}");
                 found += 1;
                 assert!(case.is_named_alone(), "{case:?}");
             }
@@ -281,9 +187,6 @@ fn the_published_xsens_session_has_a_gyro_that_feels_force() {
         .find(|s| s.sensor == Sensor::Gyro)
         .unwrap();
     let [before, after] = gyro.decision.held_out_rms.map(f64::to_degrees);
-    println!(
-        "direction of gravity after a turn, held out: {before:.3} deg before, {after:.3} deg after"
-    );
     assert!(before > 0.45 && after < 0.18);
 }
 
@@ -292,7 +195,6 @@ fn nothing_is_added_to_five_units_that_do_not_ask_for_it() {
     for unit in 0..5 {
         let Some(fit) = mikoff(unit) else { return };
         let found = diagnosed(fit);
-        println!("unit {unit}: {}", found.verdict.name());
         assert!(found.effects.is_empty(), "{:?}", found.effects);
     }
 }

@@ -8,7 +8,6 @@ use mimu::signal::stillness::STILL_FACTOR;
 use mimu::warning::Warning;
 use mimu_recording::{ImportOptions, RawUnit, Recording, Reference, import};
 use mimu_rig::located::Source;
-use mimu_rig::random::Random;
 use mimu_rig::rig_file::RigFile;
 use mimu_tests::bench;
 
@@ -85,8 +84,7 @@ fn a_violent_shake_is_clipped_and_its_turn_left_out_by_name() {
 /// In the noise of analog parts a turn of 0.7 deg/s goes unnoticed: three such rests among 38 tripled the error of the gyro.
 #[test]
 fn a_rest_that_turns_evenly_is_no_dwell() {
-    let mut random = Random::new(7, "unit");
-    let mut file = bench::clean(bench::gyro(&mut random), bench::accel(&mut random));
+    let mut file = bench::drawn(7, "unit");
     let turning = |file: &RigFile| {
         let prepared = bench::recorded(&bench::hand_plan(38), file, 7);
         let is = |d: &&Dwell| d.faults.gyro == Some(Fault::Turning);

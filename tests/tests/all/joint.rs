@@ -25,7 +25,6 @@ fn the_axes_of_a_cubic_by_hand_stay_together_and_their_intervals_hold_the_truth(
         assert_eq!(cubic.candidate.active, [0, 1, 2]);
         for (value, sigma) in cubic.values.iter().zip(&cubic.sigmas) {
             let [value, sigma] = [value, sigma].map(|v| v * 1e3 * 9.806_65 * 9.806_65);
-            println!("seed {seed}: {value:.1} ± {sigma:.1} mg/g³");
             assert!(
                 (value - 12.0).abs() < 3.0 * sigma && sigma < 6.0,
                 "{case:?}"

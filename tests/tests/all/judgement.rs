@@ -12,7 +12,6 @@ use mimu::quantity::Sensor;
 use mimu::signal::stillness::STILL_FACTOR;
 use mimu::warning::Warning;
 use mimu_recording::{RawUnit, Recording};
-use mimu_rig::random::Random;
 use mimu_rig::rig_file::{AffineFile, RigFile};
 use mimu_tests::bench;
 use nalgebra::{Matrix3, Vector3};
@@ -20,8 +19,7 @@ use nalgebra::{Matrix3, Vector3};
 const SEED: u64 = 4;
 
 fn unit() -> RigFile {
-    let mut random = Random::new(SEED, "unit");
-    bench::clean(bench::gyro(&mut random), bench::accel(&mut random))
+    bench::drawn(SEED, "unit")
 }
 
 fn fitted(prepared: Prepared) -> Fit {
@@ -30,7 +28,6 @@ fn fitted(prepared: Prepared) -> Fit {
 
 fn kind(prepared: Prepared) -> JudgementKind {
     let judgement = Judgement::of_fit(&fitted(prepared));
-    println!("{judgement}");
     judgement.kind
 }
 
@@ -133,7 +130,6 @@ fn nothing_held_out_is_untested() {
 fn an_error_that_the_model_lacks_is_unexplained_and_a_file_contains_it() {
     let fit = fitted(driven(RawUnit::Si, 1.0, bent));
     let judgement = Judgement::of_fit(&fit);
-    println!("{judgement}");
     assert_eq!(judgement.kind, JudgementKind::Unexplained);
     let file = Calibration::of(&fit, &[], "").expect("a file").to_toml();
     let read = Calibration::parse(&file, "file").expect("readable");
@@ -154,7 +150,6 @@ fn a_file_whose_own_fit_errs_is_good_on_no_other_day() {
     for seed in [5, 6] {
         let later = driven_on(seed, RawUnit::Si, 1.0, bent);
         let found = verify(&later, &file).expect("verified");
-        println!("{}", found.judgement);
         assert!(found.judgement.kind >= own.kind, "{}", found.judgement);
         // Also without the word of the file.
         let mut unjudged = file.clone();
@@ -230,7 +225,6 @@ fn a_changed_bias_is_distinguished_from_a_wrong_matrix_with_intervals_that_conta
         let of_matrix = of_matrix.sum::<f64>() / n;
         let of_bias = Vector3::from(bias).norm_squared();
         let truth = of_bias / (of_bias + of_matrix);
-        println!("{truth:.4} {causes:?}");
         let margin = 0.01;
         let within = |share: f64, s: &Share| (s.lower - margin..=s.upper + margin).contains(&share);
         assert!(within(truth, &causes.bias), "{truth} {:?}", causes.bias);

@@ -10,8 +10,9 @@ use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
 use mimu::signal::stillness::STILL_FACTOR;
 use mimu_cli::called::{Session, wizard};
-use mimu_cli::report::{wizard_lines, wizard_text};
+use mimu_cli::report::wizard_lines;
 use mimu_recording::Recording;
+use mimu_tests::says;
 use mimu_tests::spinner::{Slip, Spinner};
 use mimu_tests::stored_calibration::half_widths;
 use mimu_tests::text_board::TextBoard;
@@ -133,21 +134,20 @@ fn a_person_who_errs_in_whole_turns_is_told_so_and_ends_with_scale_factors_to_a_
         .lead(&mut person, &mut said, |_| false)
         .expect("it ends");
     let all = said.join("\n");
-    println!("{all}");
     assert_eq!(refused, None, "{all}");
     let outcome = outcome.unwrap();
-    println!("{}", wizard_text(&outcome));
-    for words in [
-        "9.0 turns so far, and 10 are wanted: turn it once more",
-        "5.4 turns so far, and 10 are wanted: turn it 5 times more",
-        "it lies 40 degrees from where it lay",
-        "these turns cannot be used: it lies 40",
-        "it reached the end of the gyro's range, ",
-        "3 turns about -x",
-        "360 deg about z read as 3",
-    ] {
-        assert!(all.contains(words), "{words}:\n{all}");
-    }
+    says(
+        &all,
+        &[
+            "9.0 turns so far, and 10 are wanted: turn it once more",
+            "5.4 turns so far, and 10 are wanted: turn it 5 times more",
+            "it lies 40 degrees from where it lay",
+            "these turns cannot be used: it lies 40",
+            "it reached the end of the gyro's range, ",
+            "3 turns about -x",
+            "360 deg about z read as 3",
+        ],
+    );
     assert_eq!(count(&said[before..], "done: 10 turns"), 5, "{all}");
     assert_eq!(count(&said, "done: 10 turns"), 7, "{all}");
     assert_eq!(count(&said, "these turns cannot be used"), 2, "{all}");
@@ -175,7 +175,6 @@ fn a_person_who_errs_in_whole_turns_is_told_so_and_ends_with_scale_factors_to_a_
     assert!(difference.norm() < 1e-9 * gyro.inverse.matrix.norm());
     for estimate in [0, 4, 8].map(|k| gyro.forward_estimates()[k]) {
         let half = estimate.interval / estimate.value.abs();
-        println!("scale factor to {:.4} %", 100.0 * half);
         assert!(half < 3e-4, "{half}");
     }
 }

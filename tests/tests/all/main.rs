@@ -39,4 +39,3 @@ mod strong_nonlinearity;
 mod temperature;
 mod turning;
 mod whole_turns;
-mod whole_turns_peers;

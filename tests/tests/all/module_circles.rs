@@ -8,22 +8,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Crates, as folders from the root of the repository.
+#[rustfmt::skip]
 const CRATES: [&str; 15] = [
-    "core",
-    "firmware",
-    "host/recording",
-    "host/allan",
-    "host/mimu",
-    "host/thermal",
-    "host/device",
-    "host/equipment",
-    "host/export",
-    "host/fleet",
-    "host/wizard",
-    "host/station",
-    "host/cli",
-    "rig",
-    "rig/board",
+    "core", "firmware", "host/recording", "host/allan", "host/mimu", "host/thermal", "host/device", "host/equipment", "host/export",
+    "host/fleet", "host/wizard", "host/station", "host/cli", "rig", "rig/board",
 ];
 
 /// A module by its path from the crate's root, which is empty.

@@ -55,22 +55,6 @@ fn first_of_gyro(found: &NoiseInUse) -> Option<Cause> {
 }
 
 #[test]
-#[ignore = "nightly: two sessions by hand, a minute"]
-fn nothing_is_inflated_where_nothing_is_wrong_and_a_scale_error_is_called_one() {
-    let all = cases(Wrong::Nothing, 24, 0..1);
-    let (inside, count) = not_inflated(&all);
-    assert_eq!(inside, count);
-    let all = cases(Wrong::Scale, 24, 0..1);
-    let [(_, found)] = &all[..] else {
-        panic!("refused")
-    };
-    // Its interval begins at 1: errors of the rests could explain as much. The cause decides.
-    assert!(found.densities[0].factor.unwrap() > 1.5);
-    assert!(found.nees.allan.value > 3.0);
-    assert_eq!(first_of_gyro(found), Some(Cause::Scale));
-}
-
-#[test]
 #[ignore = "nightly: twenty seeds of five units"]
 fn table_of_causes() {
     let mut named = Vec::new();

@@ -72,7 +72,6 @@ fn white_noise_bias_instability_and_random_walk_are_within_their_intervals() {
             }
         }
     }
-    println!("of 36 channels N, B, K told {told:?}, inside {inside:?}; Q or R: {strange:?}");
     // The expected number is 34 of 36 (95 %); fewer than 30 have a probability of 3e-3.
     for (i, term) in terms.into_iter().enumerate() {
         assert!(told[i] >= 34, "{term:?} told {}", told[i]);
@@ -92,8 +91,7 @@ fn means_of_samples_behind_the_filters_of_fangs_parts_scatter_as_the_budget_says
     const STEPS: usize = 8;
     const RATE_HZ: usize = 1000;
     const SECONDS: usize = 300;
-    let mut random = Random::new(1, "unit");
-    let mut file: RigFile = bench::clean(bench::gyro(&mut random), bench::accel(&mut random));
+    let mut file: RigFile = bench::drawn(1, "unit");
     for axes in [&mut file.unit.gyro_axes, &mut file.unit.accel_axes] {
         (axes.instability_si, axes.walk_si) = (Some([0.0; 3]), Some([0.0; 3]));
     }

@@ -12,7 +12,6 @@ fn effects_planted_in_a_real_recording_are_named_alone_and_mostly_removed() {
     assert!(untouched.found.is_empty(), "{:?}", untouched.found);
     for id in ["gyro_g_sensitivity", "accel_scale_quadratic"] {
         let planted = ground.plant(id, 1.0, 0, &untouched).expect("it shows");
-        println!("{planted:?}");
         assert_eq!(planted.outcome(), Outcome::Named, "{planted:?}");
         assert_eq!(planted.not_there().count(), 0, "{planted:?}");
         let [_, affine, with_effects] = planted.errors;
@@ -50,7 +49,6 @@ fn a_g_sensitivity_that_the_rates_at_rest_of_another_session_show_is_accepted() 
         let gyro = &gyro.expect("recorded").decision;
         let accepted = gyro.accepted.iter().find(|a| a.effect.id() == id);
         let second = accepted.and_then(|a| a.second);
-        println!("unit {unit}: {second:?}");
         assert!(second.is_some(), "unit {unit}: {:?}", gyro.rejected);
     }
 }

@@ -103,7 +103,6 @@ fn biases_that_step_at_a_restart_are_those_of_the_last_power_on_within_their_int
     let judged = all
         .into_iter()
         .fold(Judged::default(), |sum, a| sum.merge(a.0));
-    println!("{:?}, {bad} judged wrong", judged.shares);
     assert!(bad <= 1, "{bad} of 24 are judged wrong");
     for name in [
         "gyro scale",

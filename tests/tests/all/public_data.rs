@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
+use mimu_tests::says;
 use tempfile::TempDir;
 
 /// SHA-256 of `one\n` and of `two\n`, by `sha256sum`.
@@ -76,9 +77,7 @@ fn public_recordings_arrive_with_their_source_and_are_fetched_once() {
     assert!(first.status.success(), "{first:?}");
     assert_eq!(mirror.brought(), ["SOURCE.txt", "one.csv", "two.csv"]);
     let source = std::fs::read_to_string(mirror.path("data/unit/SOURCE.txt")).unwrap();
-    for part in ["someone/imu", "0123abc", "MIT"] {
-        assert!(source.contains(part), "{source}");
-    }
+    says(&source, &["someone/imu", "0123abc", "MIT"]);
     // Without the mirror, a second run succeeds only if it fetches nothing.
     std::fs::remove_dir_all(mirror.path("from")).unwrap();
     let second = mirror.bring().unwrap();

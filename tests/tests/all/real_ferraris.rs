@@ -11,6 +11,7 @@ use mimu::triad::invert;
 use mimu_core::compensation::Affine;
 use mimu_recording::RawUnit;
 use mimu_tests::recordings::{Foreign, Samples, data_set, numbers, rms};
+use mimu_tests::says;
 use nalgebra::{Matrix3, Vector3};
 use tempfile::TempDir;
 
@@ -258,12 +259,12 @@ pub(crate) fn uninterrupted() -> Option<(Session, Samples)> {
 }
 
 /// Runs `check` on both sessions.
-fn on_both(check: impl Fn(&str, &Session)) {
+fn on_both(check: impl Fn(&Session)) {
     if let Some(session) = annotated() {
-        check("annotated", &session);
+        check(&session);
     }
     if let Some((session, _)) = uninterrupted() {
-        check("uninterrupted", &session);
+        check(&session);
     }
 }
 
@@ -276,35 +277,13 @@ fn forward(fit: &Fit, sensor: Sensor) -> Affine<f64> {
     }
 }
 
-fn print_matrices(title: &str, ours: &Matrix3<f64>, theirs: &Matrix3<f64>) {
-    println!("{title:48} mimu                        imucal                  difference");
-    for i in 0..3 {
-        let row = |m: &Matrix3<f64>, digits: usize| -> String {
-            (0..3).map(|j| format!("{:9.digits$}", m[(i, j)])).collect()
-        };
-        println!(
-            "{:>24}{}   {}   {}",
-            "",
-            row(ours, 4),
-            row(theirs, 4),
-            row(&(ours - theirs), 5)
-        );
-    }
-}
-
 #[test]
 fn the_six_position_method_gives_the_diagonals_of_imucal() {
-    on_both(|name, session| {
+    on_both(|session| {
         let fit = session.fit(false, Method::SixPositions);
         let (ours, theirs) = (forward(&fit, Sensor::Accel), &session.published.accel);
-        println!("\n{name}: scale factor and bias by six positions");
         for i in 0..3 {
             let (s, b) = (ours.matrix[(i, i)], ours.offset[i]);
-            println!(
-                "{s:12.6} {:12.6}   {b:11.6} {:11.6}",
-                theirs.matrix[(i, i)],
-                theirs.offset[i]
-            );
             // Both are (u+ - u-)/2g and (u+ + u-)/2 of the same means: equal to the rounding of sums over a thousand samples.
             assert!((s - theirs.matrix[(i, i)]).abs() < 1e-9 * s, "{s}");
             assert!((b - theirs.offset[i]).abs() < 1e-9 * s * GRAVITY, "{b}");
@@ -314,16 +293,10 @@ fn the_six_position_method_gives_the_diagonals_of_imucal() {
 
 #[test]
 fn least_squares_on_six_faces_is_imucals_matrix_and_the_mean_of_all_its_biases() {
-    on_both(|name, session| {
+    on_both(|session| {
         let fit = session.fit(false, Method::LeastSquares);
         let ours = forward(&fit, Sensor::Accel);
         let theirs = &session.published.accel;
-        println!();
-        print_matrices(
-            &format!("{name}: K_a R_a, counts per m/s^2"),
-            &ours.matrix,
-            &theirs.matrix,
-        );
         // Six opposite inputs are an orthogonal design, for which least squares uses the same differences as imucal. Only the weights differ: the
         // lengths of the faces make the variances of the means differ by some 0.1 % of the extra white variance, which acts on a residual of up to 17
         // counts on 2 g.
@@ -331,10 +304,6 @@ fn least_squares_on_six_faces_is_imucals_matrix_and_the_mean_of_all_its_biases()
         assert!(worst < 2e-3, "{worst} counts per m/s^2");
         // imucal takes the bias of a sensor only from the pair along its axis, least squares from all three pairs.
         let triad = &fit.sensor(Sensor::Accel).expect("fitted").estimated.triad;
-        println!(
-            "{:>24}bias: mimu    +-95 %    imucal   by pairs x, y, z",
-            ""
-        );
         for i in 0..3 {
             let pairs = ["x", "y", "z"].map(|a| {
                 let [p, n] = ["p", "a"].map(|end| session.part(&format!("{a}_{end}")).mean()[i]);
@@ -342,10 +311,6 @@ fn least_squares_on_six_faces_is_imucals_matrix_and_the_mean_of_all_its_biases()
             });
             let b = ours.offset[i];
             let interval = triad.forward_estimates()[9 + i].interval;
-            println!(
-                "{:>30}{b:10.4} {interval:9.2} {:9.4}   {:.2} {:.2} {:.2}",
-                "", theirs.offset[i], pairs[0], pairs[1], pairs[2]
-            );
             assert!((pairs[i] - theirs.offset[i]).abs() < 1e-6, "{pairs:?}");
             // Weighted as above, so within 0.1 % of the scatter of the pairs.
             let spread = pairs.iter().fold(0.0, |m: f64, p| m.max((p - b).abs()));
@@ -359,28 +324,12 @@ fn least_squares_on_six_faces_is_imucals_matrix_and_the_mean_of_all_its_biases()
 
 #[test]
 fn turns_give_imucals_gyro_once_its_term_in_specific_force_is_added_back() {
-    on_both(|name, session| {
+    on_both(|session| {
         let fit = session.fit(true, Method::LeastSquares);
         assert_eq!(fit.prepared.manifest.turn_steps.len(), 3);
         let ours = forward(&fit, Sensor::Gyro);
         let published = &session.published;
-        println!();
         let per_degree = ours.matrix * 1f64.to_radians();
-        print_matrices(
-            &format!("{name}: K_g R_g, counts per deg/s"),
-            &per_degree,
-            &published.gyro.matrix,
-        );
-        println!(
-            "{:>24}bias mimu {:.5} {:.5} {:.5}, imucal {:.5} {:.5} {:.5} counts",
-            "",
-            ours.offset.x,
-            ours.offset.y,
-            ours.offset.z,
-            published.gyro.offset.x,
-            published.gyro.offset.y,
-            published.gyro.offset.z
-        );
         // If noise explains the scatter of the rests, as here, they are weighted by length, and their mean over all samples is imucal's bias.
         // Otherwise all rests have the same weight, and the difference is up to their scatter, which sigma includes.
         let triad = &fit.sensor(Sensor::Gyro).expect("fitted").estimated.triad;
@@ -409,22 +358,10 @@ fn turns_give_imucals_gyro_once_its_term_in_specific_force_is_added_back() {
             .apply(&rate_dps);
             largest = largest.max((reading - ours).amax());
         }
-        println!(
-            "{:>24}readings of the turns agree to {largest:.1e} counts",
-            ""
-        );
         let scale = per_degree.diagonal().map(f64::abs).mean();
         let earth = scale * mimu::estimate::earth::RATE.to_degrees();
         assert!(largest < 0.5 * earth, "{largest} counts of {earth}");
         let share = term.amax() / scale;
-        let at_1g = (published.k_ga * GRAVITY).amax();
-        println!(
-            "{:>24}without K_ga: K_g R_g off by up to {:.4} counts per deg/s ({:.3} deg); K_ga is up to {at_1g:.3} counts at 1 g ({:.1} mdeg/s)",
-            "",
-            term.amax(),
-            share.to_degrees(),
-            1e3 * at_1g / scale
-        );
         // The model without K_ga turns that term into scale factor and misalignment. The error is far below that of turns by hand, whose axes are up
         // to 1.5 degrees off.
         assert!(share.to_degrees() < 0.05, "{term}");
@@ -438,11 +375,9 @@ fn moves_between_faces_that_no_fit_has_seen_are_predicted_as_well_as_by_imucal()
     };
     let fit = session.fit(true, Method::LeastSquares);
     let data = data_set("imucal_ferraris").expect("it was there");
-    let faces: Vec<_> = session_parts(&data)
-        .into_iter()
-        .filter(|(n, _)| !n.ends_with("rot"))
-        .collect();
-    let rows: Vec<_> = faces.iter().map(|f| f.1.clone()).collect();
+    let faces = session_parts(&data).into_iter();
+    let faces = faces.filter(|(name, _)| !name.ends_with("rot"));
+    let rows: Vec<_> = faces.map(|(_, rows)| rows).collect();
     let published = &session.published;
     let per_radian = |m: &Affine<f64>| Affine {
         matrix: m.matrix * 1f64.to_degrees(),
@@ -464,37 +399,11 @@ fn moves_between_faces_that_no_fit_has_seen_are_predicted_as_well_as_by_imucal()
             .collect(),
         ..samples.clone()
     };
-    // The gyro with its own accelerometer and with the other one, to separate the contributions of the two sensors.
-    let columns = [
-        ("mimu", samples.direction_errors(&rows, &ours[0], &ours[1])),
-        (
-            "imucal",
-            corrected.direction_errors(&rows, &theirs[0], &theirs[1]),
-        ),
-        (
-            "imucal less K_ga",
-            samples.direction_errors(&rows, &theirs[0], &theirs[1]),
-        ),
-        (
-            "mimu gyro, imucal accel",
-            samples.direction_errors(&rows, &theirs[0], &ours[1]),
-        ),
+    let all = [
+        samples.direction_errors(&rows, &ours[0], &ours[1]),
+        corrected.direction_errors(&rows, &theirs[0], &theirs[1]),
     ];
-    println!("\nangle between predicted and measured gravity, deg");
-    for (k, pair) in faces.windows(2).enumerate() {
-        let cells: String = columns
-            .iter()
-            .map(|(_, e)| format!("{:8.3}", e[k].to_degrees()))
-            .collect();
-        println!("{} -> {}{cells}", pair[0].0, pair[1].0);
-    }
-    let all: Vec<f64> = columns
-        .iter()
-        .map(|(_, e)| rms(e.iter().copied()).to_degrees())
-        .collect();
-    for ((name, _), rms) in columns.iter().zip(&all) {
-        println!("{rms:8.3} rms {name}");
-    }
+    let all = all.map(|errors| rms(errors).to_degrees());
     // 0.729 is the result of imucal's own program, with its own integration of the same rows.
     assert!((all[1] - 0.729).abs() < 0.002, "{} deg", all[1]);
     // The two calibrations differ by an accelerometer bias of 3 counts, 0.08 degrees of direction, so differences of that size are chance. The degree
@@ -525,13 +434,10 @@ fn six_faces_taken_for_poses_by_hand_are_refused_with_what_they_lack_where_no_gy
     // Six faces, accurate to a degree or two, determine six numbers: scale factors and biases. The three non-orthogonalities depend on these small
     // deviations, and repeated faces add nothing.
     let error = fit.expect_err("it lacks slanted poses");
-    println!("{error}");
-    for name in ["C_yx", "C_zx", "C_zy", "undetermined", "add poses"] {
-        assert!(
-            error.to_string().contains(name),
-            "{name} is not in: {error}"
-        );
-    }
+    says(
+        &error.to_string(),
+        &["C_yx", "C_zx", "C_zy", "undetermined", "add poses"],
+    );
 }
 
 #[test]
@@ -550,10 +456,6 @@ fn with_the_turns_between_them_six_faces_by_hand_have_the_scale_factors_and_bias
         let scale = published.matrix.row(i).norm() / counts;
         let bias = published.offset[i] / counts;
         let (s, b) = (physical.scale[i], physical.bias[i]);
-        println!(
-            "{:.5} ± {:.5} {scale:.5}   {:.4} ± {:.4} {bias:.4} m/s²",
-            s.value, s.interval, b.value, b.interval
-        );
         // imucal takes the faces to be level. A degree off level changes a scale factor by 1.5e-4, and a bias by 1.5 mm/s² plus the difference
         // between the two ends of an axis.
         assert!((s.value - scale).abs() < 5e-4, "{} {scale}", s.value);

@@ -51,11 +51,6 @@ fn an_effect_found_in_either_half_of_a_real_session_lowers_the_error_of_the_othe
         };
         assert_eq!(one.chosen.candidate.id(), "gyro_g_sensitivity");
         let on_other = one.second.expect("turns and rests judge it");
-        println!(
-            "turns of the other half: {:.3} deg without it, {:.3} deg with it",
-            on_other.rms_before.to_degrees(),
-            on_other.rms_after.to_degrees()
-        );
         assert!(on_other.shows && on_other.rms_after < 0.5 * on_other.rms_before);
         one.clone()
     });
@@ -67,6 +62,5 @@ fn an_effect_found_in_either_half_of_a_real_session_lowers_the_error_of_the_othe
         (a.effect.values[i] - b.effect.values[i]).powi(2) / variance
     };
     let chi2: f64 = (0..9).map(square).sum();
-    println!("chi-square of the differences {chi2:.1}");
     assert!(chi2 < 27.9);
 }

@@ -15,28 +15,11 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 /// b (m/s²), gyro s (%), m (deg), b (deg/s), eps (deg).
 type Parameters = [f64; 21];
 
+#[rustfmt::skip]
 const NAMES: [&str; 21] = [
-    "accel s_x %",
-    "accel s_y %",
-    "accel s_z %",
-    "accel m_yz deg",
-    "accel m_xy deg",
-    "accel m_xz deg",
-    "accel b_x m/s2",
-    "accel b_y m/s2",
-    "accel b_z m/s2",
-    "gyro s_x %",
-    "gyro s_y %",
-    "gyro s_z %",
-    "gyro m_yz deg",
-    "gyro m_xy deg",
-    "gyro m_xz deg",
-    "gyro b_x deg/s",
-    "gyro b_y deg/s",
-    "gyro b_z deg/s",
-    "gyro eps_x deg",
-    "gyro eps_y deg",
-    "gyro eps_z deg",
+    "accel s_x %", "accel s_y %", "accel s_z %", "accel m_yz deg", "accel m_xy deg", "accel m_xz deg", "accel b_x m/s2", "accel b_y m/s2",
+    "accel b_z m/s2", "gyro s_x %", "gyro s_y %", "gyro s_z %", "gyro m_yz deg", "gyro m_xy deg", "gyro m_xz deg", "gyro b_x deg/s",
+    "gyro b_y deg/s", "gyro b_z deg/s", "gyro eps_x deg", "gyro eps_y deg", "gyro eps_z deg",
 ];
 
 /// The published table: a row for each parameter, a column for each unit.
@@ -202,28 +185,15 @@ fn own(fit: &Fit) -> [Affine<f64>; 2] {
 
 #[test]
 fn accelerometers_agree_with_the_published_ones_and_gyros_where_the_table_can_be_trusted() {
-    let (mut outside, mut gyro_outside) = (Vec::new(), 0);
+    let mut outside = Vec::new();
     for unit in UNITS {
         let Some((fit, _)) = fitted(unit) else {
             return;
         };
         let models = Models::of(&fit);
-        println!(
-            "\nunit {unit}               mimu  +-95 %   published in sigmas   its program in sigmas"
-        );
         let ours = models.in_convention(published_convention);
-        for (k, &(value, sigma, interval)) in ours.iter().enumerate() {
-            let tables = [PUBLISHED[k][unit], PROGRAM[k][unit]];
-            let [published, program] = tables.map(|t| (t - value) / sigma);
-            let far = (tables[0] - value).abs() > interval + IRREPRODUCIBLE[k / 3];
-            println!(
-                "{:15}{value:9.4} {interval:7.4} {:10.3} {published:+9.2} {:12.4} {program:+9.2}{}",
-                NAMES[k],
-                tables[0],
-                tables[1],
-                if far { "  outside" } else { "" }
-            );
-            gyro_outside += usize::from(far && k >= 9);
+        for (k, &(value, _, interval)) in ours.iter().enumerate() {
+            let far = (PUBLISHED[k][unit] - value).abs() > interval + IRREPRODUCIBLE[k / 3];
             if far && k < 9 {
                 outside.push((unit, NAMES[k]));
             }
@@ -233,15 +203,11 @@ fn accelerometers_agree_with_the_published_ones_and_gyros_where_the_table_can_be
             // turns alone, with residuals of 0.1 deg in 2.5 s each.
             if k >= 9 && unit != 1 {
                 let limit = if (15..18).contains(&k) { 0.06 } else { 0.2 };
-                let off = (program * sigma).abs();
+                let off = (PROGRAM[k][unit] - value).abs();
                 assert!(off < limit, "unit {unit}, {}: {off}", NAMES[k]);
             }
         }
     }
-    println!(
-        "\noutside the interval and the table's irreproducibility: accel {} of 45, gyro {gyro_outside} of 60",
-        outside.len()
-    );
     // The accelerometer's residual is noise, so the intervals are valid: 2 of 45 are expected outside 95 %, and the two estimates share most of their
     // samples.
     assert!(outside.len() <= 2, "{outside:?}");
@@ -249,12 +215,6 @@ fn accelerometers_agree_with_the_published_ones_and_gyros_where_the_table_can_be
 
 #[test]
 fn on_the_same_rests_sizes_of_gravity_are_closer_than_by_the_published_program() {
-    println!(
-        "            size of gravity, mm/s^2          direction after turns, deg           at rest, deg/s"
-    );
-    println!(
-        "unit rests  mimu held  publ. prog.    mimu  held   publ.  prog. (quaternions)     mimu publ. prog."
-    );
     for unit in UNITS {
         let Some((fit, samples)) = fitted(unit) else {
             return;
@@ -268,32 +228,9 @@ fn on_the_same_rests_sizes_of_gravity_are_closer_than_by_the_published_program()
         let by_mimu = candidates.map(|[a, g]| verdict(&fit, &a, &g).expect("it can be judged"));
         let by_quaternions =
             candidates.map(|[a, g]| rms(samples.direction_errors(&rests, &a, &g)).to_degrees());
-        let held = [Sensor::Accel, Sensor::Gyro].map(|s| {
-            fit.sensor(s)
-                .and_then(|f| f.held_out_rms())
-                .expect("held out")
-        });
         let size = by_mimu.map(|v| 1e3 * v.size_mps2);
         let angle = by_mimu.map(|v| v.direction_rad.to_degrees());
         let rate = by_mimu.map(|v| v.rest_rps.to_degrees());
-        println!(
-            "{unit:4} {:5}  {:4.2} {:5.2} {:5.2} {:5.2}   {:.4} {:.4} {:.4} {:.4} ({:.4} {:.4} {:.4})  {:.4} {:.4} {:.4}",
-            rests.len(),
-            size[0],
-            1e3 * held[0],
-            size[1],
-            size[2],
-            angle[0],
-            held[1].to_degrees(),
-            angle[1],
-            angle[2],
-            by_quaternions[0],
-            by_quaternions[1],
-            by_quaternions[2],
-            rate[0],
-            rate[1],
-            rate[2],
-        );
         for (a, b) in angle.iter().zip(&by_quaternions) {
             // Two integrations of the same samples: mimu's begins and ends at block limits, up to a sample off at no more than 0.1 deg/s, and
             // includes the coning between samples.
@@ -349,41 +286,21 @@ fn units_on_one_board_agree_better_on_its_rotations_than_by_the_published_calibr
         let Some((fit, samples)) = fitted(unit) else {
             return;
         };
-        let (ours, program) = (own(&fit), in_units(unit, &PROGRAM));
-        let biased = |gyro: &Affine<f64>| {
-            let bias = -ours[1].matrix.try_inverse().expect("regular") * ours[1].offset;
-            Affine {
-                matrix: gyro.matrix,
-                offset: -gyro.matrix * bias,
-            }
-        };
-        let candidates = vec![
-            ("mimu", ours),
-            ("published", in_units(unit, &PUBLISHED)),
-            ("its program", program),
-            (
-                "its program, mimu's bias",
-                [program[0], biased(&program[1])],
-            ),
+        let candidates = [
+            own(&fit),
+            in_units(unit, &PUBLISHED),
+            in_units(unit, &PROGRAM),
         ];
         units.push((dwell_rows(&fit), samples, candidates));
     }
-    let names: Vec<&str> = units[0].2.iter().map(|c| c.0).collect();
-    let n = names.len();
-    let (mut turns, mut rotation, mut angle, mut gravity) = (
-        0,
-        vec![Vec::new(); n],
-        vec![Vec::new(); n],
-        vec![Vec::new(); n],
-    );
-    let mut by_unit = vec![vec![Vec::new(); n]; 5];
+    let (mut rotation, mut angle) = ([const { Vec::new() }; 3], [const { Vec::new() }; 3]);
+    let mut by_unit = vec![[const { Vec::new() }; 3]; 5];
     for i in UNITS {
         for j in 0..i {
             let [(rests_a, a, of_a), (rests_b, b, of_b)] = [&units[i], &units[j]];
             let rests = common([rests_a, rests_b], [a.t_s.len(), b.t_s.len()]);
-            turns += rests.len() - 1;
-            for k in 0..n {
-                let ([accel_a, gyro_a], [accel_b, gyro_b]) = (&of_a[k].1, &of_b[k].1);
+            for k in 0..3 {
+                let ([accel_a, gyro_a], [accel_b, gyro_b]) = (&of_a[k], &of_b[k]);
                 let up = |s: &Samples, m: &Affine<f64>, side: usize| -> Vec<Vector3<f64>> {
                     rests
                         .iter()
@@ -392,11 +309,6 @@ fn units_on_one_board_agree_better_on_its_rotations_than_by_the_published_calibr
                 };
                 let (up_a, up_b) = (up(a, accel_a, 0), up(b, accel_b, 1));
                 let mount = mounting(&up_a, &up_b);
-                gravity[k].extend(
-                    up_a.iter()
-                        .zip(&up_b)
-                        .map(|(a, b)| a.angle(&(mount * b)).to_degrees()),
-                );
                 for pair in rests.windows(2) {
                     let turn_a = a.rotation(gyro_a, pair[0].middle[0], pair[1].middle[0]);
                     let turn_b = b.rotation(gyro_b, pair[0].middle[1], pair[1].middle[1]);
@@ -411,21 +323,8 @@ fn units_on_one_board_agree_better_on_its_rotations_than_by_the_published_calibr
             }
         }
     }
-    let all = |v: &[Vec<f64>]| -> Vec<f64> { v.iter().map(|v| rms(v.iter().copied())).collect() };
-    let (rotation, angle, gravity) = (all(&rotation), all(&angle), all(&gravity));
-    println!("\ndisagreement of two units, rms over {turns} rotations of 10 pairs, deg");
-    println!(
-        "                           rotation   its angle   gravity at rest   rotation by unit 0 1 2 3 4"
-    );
-    for k in 0..n {
-        let each: String = UNITS
-            .map(|u| format!(" {:.3}", rms(by_unit[u][k].iter().copied())))
-            .collect();
-        println!(
-            "{:25} {:9.4} {:11.4} {:17.4}  {each}",
-            names[k], rotation[k], angle[k], gravity[k]
-        );
-    }
+    let all = |v: [Vec<f64>; 3]| v.map(rms);
+    let (rotation, angle) = (all(rotation), all(angle));
     // The angle of a rotation depends on neither mounting nor accelerometer, so this compares the gyros.
     assert!(
         rotation[0] < rotation[2] && rotation[2] < rotation[1],

@@ -7,36 +7,17 @@ use mimu_core::compensation::Affine;
 use mimu_tests::recordings::{Models, upper_triangular_frame, verdict, xsens};
 use nalgebra::{Matrix3, Vector3};
 
-/// IMU-TK: error over dwell means in mm/s² and direction error in degrees, in sample and held out.
-const IMU_TK_MMPS2: [f64; 2] = [1.116, 2.146];
-const IMU_TK_DEG: [f64; 2] = [0.517, 0.607];
+/// IMU-TK's direction error in degrees, in sample; held out it is 0.607. Over dwell means it errs by 1.116 mm/s², held out by 2.146.
+const IMU_TK_DEG: f64 = 0.517;
 
 /// IMU-TK's accelerometer, `x = T K (raw - b)`: 1/K in counts per m/s², T_xy T_xz T_yz, b in counts.
-const IMU_TK_ACCEL: [f64; 9] = [
-    414.4589,
-    412.0105,
-    414.6487,
-    -0.003359299,
-    -0.008906395,
-    -0.021334119,
-    33124.1826,
-    33275.1794,
-    32364.4156,
-];
+#[rustfmt::skip]
+const IMU_TK_ACCEL: [f64; 9] = [414.4589, 412.0105, 414.6487, -0.003359299, -0.008906395, -0.021334119, 33124.1826, 33275.1794, 32364.4156];
 
 /// IMU-TK's gyro in the same form, T by rows without its diagonal: 1/K in counts per rad/s.
+#[rustfmt::skip]
 const IMU_TK_GYRO: [f64; 12] = [
-    4777.9558,
-    4764.2066,
-    4773.6574,
-    0.00593634,
-    0.001111009,
-    0.008088118,
-    -0.053556862,
-    0.025306721,
-    -0.002551303,
-    32777.1399,
-    32459.8029,
+    4777.9558, 4764.2066, 4773.6574, 0.00593634, 0.001111009, 0.008088118, -0.053556862, 0.025306721, -0.002551303, 32777.1399, 32459.8029,
     32511.8475,
 ];
 
@@ -44,11 +25,6 @@ const IMU_TK_GYRO: [f64; 12] = [
 fn the_dwells_of_a_recording_by_hand_are_found() {
     let Some(fit) = xsens() else { return };
     let [accel, gyro] = [Sensor::Accel, Sensor::Gyro].map(|s| fit.sensor(s).unwrap());
-    println!(
-        "{} dwells, {} turns",
-        accel.residuals.len(),
-        gyro.residuals.len()
-    );
     // IMU-TK also finds 38, at each of its thresholds from 5 to 9. Every dwell but the first ends a turn.
     assert_eq!((accel.residuals.len(), gyro.residuals.len()), (38, 37));
 }
@@ -59,29 +35,10 @@ fn errors_in_sample_and_on_held_out_blocks_are_below_those_of_imu_tk() {
     let [accel, gyro] = [Sensor::Accel, Sensor::Gyro].map(|s| fit.sensor(s).unwrap());
     let size = [accel.rms(), accel.held_out_rms().unwrap()].map(|x| 1e3 * x);
     let angle = [gyro.rms(), gyro.held_out_rms().unwrap()].map(f64::to_degrees);
-    println!("                          in sample          held out, 4 blocks");
-    println!("                          mimu    IMU-TK     mimu    IMU-TK");
-    for (what, ours, theirs) in [
-        ("size of gravity, mm/s^2 ", size, IMU_TK_MMPS2),
-        ("direction after turn,deg", angle, IMU_TK_DEG),
-    ] {
-        println!(
-            "{what}  {:.3}   {:.3}      {:.3}   {:.3}",
-            ours[0], theirs[0], ours[1], theirs[1]
-        );
-    }
-    println!(
-        "noise floor {:.3} mm/s^2, {:.3} deg",
-        1e3 * accel.noise_floor(),
-        gyro.noise_floor().to_degrees()
-    );
     // In sample the limit is IMU-TK's own figure. Held out, the limit for the accelerometer is just above its present error (1.56 mm/s²; IMU-TK,
     // given dwell means in place of its samples, reaches 1.57). For the gyro it is just below IMU-TK's error.
     assert!(size[0] <= 1.1 && size[1] <= 1.6, "{size:?} mm/s^2");
-    assert!(
-        angle[0] <= IMU_TK_DEG[0] && angle[1] <= 0.60,
-        "{angle:?} deg"
-    );
+    assert!(angle[0] <= IMU_TK_DEG && angle[1] <= 0.60, "{angle:?} deg");
     assert_eq!(
         (accel.held_out.reasons.len(), gyro.held_out.reasons.len()),
         (0, 0)
@@ -108,41 +65,9 @@ fn parameters_agree_with_those_of_imu_tk_in_its_own_frame() {
         out
     };
     let ours = models.in_convention(convention);
-    let accel_names = [
-        "1/K_x", "1/K_y", "1/K_z", "T_xy", "T_xz", "T_yz", "b_x", "b_y", "b_z",
-    ];
-    let gyro_names = [
-        "1/K_x", "1/K_y", "1/K_z", "T_xy", "T_xz", "T_yx", "T_yz", "T_zx", "T_zy", "b_x", "b_y",
-        "b_z",
-    ];
-    let names = accel_names
-        .iter()
-        .map(|n| ("accel", *n))
-        .chain(gyro_names.iter().map(|n| ("gyro", *n)));
     let theirs = IMU_TK_ACCEL.iter().chain(&IMU_TK_GYRO);
-    println!("parameter       mimu      +-95 %       IMU-TK   in sigmas");
-    let (mut far, mut squares, mut off) = (0, [0.0; 2], Vec::new());
-    for (k, (((sensor, name), &(value, sigma, interval)), theirs)) in
-        names.zip(&ours).zip(theirs).enumerate()
-    {
-        off.push((theirs - value) / sigma);
-        squares[usize::from(k >= 9)] += off[k] * off[k];
-        let mark = if (theirs - value).abs() > interval {
-            far += 1;
-            "  outside"
-        } else {
-            ""
-        };
-        println!(
-            "{sensor:5} {name:6} {value:11.5} {interval:10.5} {theirs:12.5} {:+8.2}{mark}",
-            off[k]
-        );
-    }
-    let [accel, gyro] = [
-        (squares[0] / 9.0_f64).sqrt(),
-        (squares[1] / 12.0_f64).sqrt(),
-    ];
-    println!("rms {accel:.2} sigmas (accel), {gyro:.2} sigmas (gyro); {far} of 21 outside");
+    let pairs = ours.iter().zip(theirs);
+    let off: Vec<f64> = pairs.map(|((value, ..), theirs)| theirs - value).collect();
     // Which gyro bias is right? IMU-TK takes it from the first rest, mimu from all rests.
     let inverse = |k: &[f64], t: Matrix3<f64>, b: &[f64]| {
         let matrix = t * Matrix3::from_diagonal(&Vector3::from_column_slice(k).map(f64::recip));
@@ -160,22 +85,12 @@ fn parameters_agree_with_those_of_imu_tk_in_its_own_frame() {
     ];
     let own = [Sensor::Accel, Sensor::Gyro].map(|s| fit.sensor(s).unwrap().estimated.triad.inverse);
     let [mimu, imu_tk] = [own, theirs].map(|[a, g]| verdict(&fit, &a, &g).unwrap());
-    println!("on mimu's dwells   size mm/s^2   direction deg   rate at rest deg/s");
-    for (name, v) in [("mimu", mimu), ("IMU-TK", imu_tk)] {
-        println!(
-            "{name:18} {:11.3} {:15.3} {:20.4}",
-            1e3 * v.size_mps2,
-            v.direction_rad.to_degrees(),
-            v.rest_rps.to_degrees()
-        );
-    }
     assert!(mimu.rest_rps < imu_tk.rest_rps && mimu.direction_rad < imu_tk.direction_rad);
     // Both use the same samples, so all nine within 95 % would be expected. One outside is chance, two are not. The gyro's biases are left out,
     // because their definitions differ.
     let outside = |from: usize| {
         let nine = from..from + 9;
-        nine.filter(|&k| off[k].abs() * ours[k].1 > ours[k].2)
-            .count()
+        nine.filter(|&k| off[k].abs() > ours[k].2).count()
     };
     let [accel_outside, gyro_outside] = [0, 9].map(outside);
     assert!(accel_outside <= 1 && gyro_outside <= 1, "{off:?}");

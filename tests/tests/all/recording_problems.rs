@@ -5,16 +5,15 @@ use mimu::recording_problem::RecordingProblem;
 use mimu::result::fit::FitResult;
 use mimu_cli::report::fit_text;
 use mimu_recording::RawUnit;
-use mimu_rig::random::Random;
 use mimu_rig::rig_file::RigFile;
 use mimu_tests::bench;
+use mimu_tests::says;
 
 const FIXTURE: &str = include_str!("../../../rig/plans/fixture.toml");
 const SEED: u64 = 4;
 
 fn unit() -> RigFile {
-    let mut random = Random::new(SEED, "unit");
-    bench::clean(bench::gyro(&mut random), bench::accel(&mut random))
+    bench::drawn(SEED, "unit")
 }
 
 fn fitted(plan: &str) -> Fit {
@@ -40,10 +39,7 @@ fn twenty_samples_a_second_are_too_few_for_turns_by_hand() {
     let fit = fitted(&slow);
     assert_eq!(ids(&fit), ["slow_for_turns"]);
     let said = RecordingProblem::of(&fit)[0].to_string();
-    assert!(
-        said.contains("20.0 Hz") && said.contains("50 Hz or more"),
-        "{said}"
-    );
+    says(&said, &["20.0 Hz", "50 Hz or more"]);
 }
 
 #[test]
@@ -78,7 +74,6 @@ fn the_list_is_first_and_a_summary_has_at_most_25_lines_of_100_columns() {
         let fit = fitted(&plan);
         let result = FitResult::of(&fit);
         let [summary, all] = [false, true].map(|verbose| fit_text(&result, verbose));
-        println!("{summary}");
         assert!(summary.lines().count() <= 25, "{summary}");
         // A sentence is one line; tables keep to the columns.
         let sentences = ["  - ", "warning:", "next:", "judgement:"];

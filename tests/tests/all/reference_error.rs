@@ -9,6 +9,7 @@ use mimu_rig::random::Random;
 use mimu_rig::rig_file::{AffineFile, RigFile};
 use mimu_tests::bench;
 use mimu_tests::coverage::Tally;
+use mimu_tests::says;
 
 /// Half of a 95 % interval in standard deviations.
 const HALF: f64 = 1.959_964;
@@ -78,7 +79,9 @@ fn tallied(runs: u64) -> [[Tally; 2]; 2] {
     tallies
 }
 
-fn judged(runs: u64) {
+#[test]
+fn intervals_that_count_the_errors_of_the_table_hold_the_truth() {
+    let runs = 40;
     let [without, with] = tallied(runs);
     for tally in without.iter().chain(&with) {
         let [mean, low, high] = tally.summary();
@@ -118,22 +121,10 @@ fn judged(runs: u64) {
     }
 }
 
-#[test]
-fn intervals_that_count_the_errors_of_the_table_hold_the_truth() {
-    judged(40);
-}
-
-#[test]
-#[ignore = "nightly: more units"]
-fn the_same_of_four_hundred_units() {
-    judged(400);
-}
-
 /// The derivatives that need no bench: a scale factor errs as gravity or the rate, an angle as the mounting.
 #[test]
 fn what_no_pose_shows_widens_the_intervals_by_all_of_it() {
-    let mut random = Random::new(1, "reference");
-    let file = bench::clean(bench::gyro(&mut random), bench::accel(&mut random));
+    let file = bench::drawn(1, "reference");
     let error = ReferenceError {
         gravity_mps2: 0.01,
         rate: 1e-3,
@@ -212,38 +203,14 @@ fn by_hand_intervals_that_count_the_error_of_gravity_hold_the_truth() {
 /// Each alone: an error that one of the sensors does not see leaves its intervals as they are.
 #[test]
 fn an_error_that_one_sensor_sees_changes_the_intervals_of_that_alone() {
-    let mut random = Random::new(1, "reference");
-    let file = bench::clean(bench::gyro(&mut random), bench::accel(&mut random));
+    let file = bench::drawn(1, "reference");
     let none = ReferenceError::default;
+    #[rustfmt::skip]
     let all = [
-        (
-            Sensor::Gyro,
-            ReferenceError {
-                rate: 1e-2,
-                ..none()
-            },
-        ),
-        (
-            Sensor::Accel,
-            ReferenceError {
-                gravity_mps2: 0.1,
-                ..none()
-            },
-        ),
-        (
-            Sensor::Accel,
-            ReferenceError {
-                tilt_deg: 0.5,
-                ..none()
-            },
-        ),
-        (
-            Sensor::Accel,
-            ReferenceError {
-                level_deg: 0.5,
-                ..none()
-            },
-        ),
+        (Sensor::Gyro, ReferenceError { rate: 1e-2,..none() }),
+        (Sensor::Accel, ReferenceError { gravity_mps2: 0.1,..none() }),
+        (Sensor::Accel, ReferenceError { tilt_deg: 0.5,..none() }),
+        (Sensor::Accel, ReferenceError { level_deg: 0.5,..none() }),
     ];
     let widths = |error: ReferenceError| {
         let prepared = bench::recorded(&bench::table_plan(None), &file, 1);
@@ -268,13 +235,13 @@ fn an_error_that_one_sensor_sees_changes_the_intervals_of_that_alone() {
 
 #[test]
 fn errors_that_a_fit_cannot_count_are_refused_by_name() {
-    let mut random = Random::new(1, "refused");
-    let file = bench::clean(bench::gyro(&mut random), bench::accel(&mut random));
+    let file = bench::drawn(1, "refused");
     let by_hand = bench::recorded(&bench::hand_plan(20), &file, 1);
     let refused = fit(by_hand.with_reference_error(stated()), Options::default());
     let said = refused.unwrap_err().to_string();
-    for key in ["rate", "mounting_deg", "tilt_deg", "orthogonality_deg"] {
-        assert!(said.contains(key), "{said}");
-    }
+    says(
+        &said,
+        &["rate", "mounting_deg", "tilt_deg", "orthogonality_deg"],
+    );
     assert!(said.contains("only gravity_mps2 applies"), "{said}");
 }

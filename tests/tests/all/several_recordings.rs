@@ -153,15 +153,6 @@ fn a_chamber_that_only_cools_cannot_tell_temperature_from_time() {
     let Some(prepared) = cooling() else { return };
     let found = diagnose(prepared.into(), Options::IN_SAMPLE).expect("a diagnosis");
     let gyro = &found.sensors[0].decision;
-    println!(
-        "rest, held out: {:.4} deg/s before, {:.4} after; floor {:.4}",
-        gyro.held_out_rms[0].to_degrees(),
-        gyro.held_out_rms[1].to_degrees(),
-        gyro.noise_floor.to_degrees()
-    );
-    for a in &gyro.accepted {
-        println!("{}: {:?}", a.chosen.candidate.id(), a.chosen.alternatives);
-    }
     let of_slow = |id: &str| {
         id.contains("thermal")
             || id.contains("drift")

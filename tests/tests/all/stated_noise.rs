@@ -6,16 +6,14 @@ use mimu::plan::design::budget::DwellNoise;
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
 use mimu::warning::Warning;
-use mimu_rig::random::Random;
 use mimu_tests::bench;
+use mimu_tests::says;
 
 const SEED: u64 = 3;
 
 /// A recording with the true noise of its unit.
 fn recorded() -> (Prepared, NoiseFile) {
-    let mut random = Random::new(SEED, "unit");
-    let (gyro, accel) = (bench::gyro(&mut random), bench::accel(&mut random));
-    let file = bench::clean(gyro, accel);
+    let file = bench::drawn(SEED, "unit");
     let prepared = bench::recorded(&bench::table_plan(Some(SEED)), &file, SEED);
     let noise = bench::noise_file(&file, SEED, prepared.condensed.period_s);
     (prepared, noise)
@@ -32,13 +30,7 @@ fn a_noise_file_in_another_unit_is_refused_with_its_channel() {
     noise.channel[4].unit = "m/s^2".into();
     let error = prepared.with_noise(&noise).unwrap_err();
     assert!(error.refused().place.contains("accel_y"), "{error}");
-    assert!(
-        error
-            .refused()
-            .problem
-            .contains("that of the readings is V"),
-        "{error}"
-    );
+    says(&error.refused().problem, &["that of the readings is V"]);
 }
 
 #[test]

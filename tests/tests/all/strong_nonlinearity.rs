@@ -25,23 +25,12 @@ fn turns(seed: u64) -> f64 {
     let ids: Vec<String> = diagnosis.effects.iter().map(|e| e.candidate.id()).collect();
     let of = |sensor| diagnosis.sensors.iter().find(|s| s.sensor == sensor);
     let [gyro, accel] = Sensor::BOTH.map(|s| &of(s).unwrap().decision);
-    let left: Vec<_> = gyro.leftover.iter().map(|l| &l.against).collect();
-    println!(
-        "seed {seed}: {} {ids:?}, turns {:.4} deg, noise {:.4}, by directions {:.4}; forces {:.2} mm/s², noise {:.2}; left {left:?}",
-        diagnosis.verdict.name(),
-        gyro.rms[1].to_degrees(),
-        gyro.noise_floor.to_degrees(),
-        gyro.reference_rms.to_degrees(),
-        1e3 * accel.rms[1],
-        1e3 * accel.noise_floor,
-    );
     assert_eq!(ids, ["accel_scale_cubic"], "seed {seed}");
     assert_eq!(diagnosis.verdict, Verdict::Explained, "seed {seed}");
     let one = &accel.accepted[0];
     for (axis, mg) in mg.iter().enumerate() {
         let [value, sigma] = [one.effect.values[axis], one.covariance[(axis, axis)].sqrt()];
         let [value, sigma] = [value, sigma].map(|v| v * 1e3 * G * G);
-        println!("  {axis}: {mg:.2} mg/g³, found {value:.2} ± {sigma:.2}");
         // The device evaluates an effect twice. The square of the slope at 1 g, 0.8 % at 3 %, is the share that remains. It is a seventh power of the
         // force, and the nearest cubic is up to twice its size.
         let left = 2.0 * (3.0 * mg * 1e-3).powi(2) * mg.abs();
@@ -54,6 +43,5 @@ fn turns(seed: u64) -> f64 {
 fn an_accelerometer_cubic_of_one_to_three_per_cent_leaves_a_good_gyro_its_noise() {
     let all: Vec<f64> = (0..SEEDS).into_par_iter().map(turns).collect();
     let mean = all.iter().sum::<f64>() / all.len() as f64;
-    println!("turns {mean:.2} of the mean square expected");
     assert!(mean < 1.5, "{all:.2?}");
 }

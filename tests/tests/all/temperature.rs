@@ -17,6 +17,7 @@ use mimu_recording::Recorded;
 use mimu_rig::random::Random;
 use mimu_rig::rig_file::{EffectFile, RigFile, RigTruth};
 use mimu_tests::bench;
+use mimu_tests::says;
 use rayon::prelude::*;
 
 type Step = ([f64; 3], f64);
@@ -57,9 +58,7 @@ fn randomised(mut steps: Vec<Step>, seed: u64) -> Vec<Step> {
 
 /// A warmed-up unit whose thermometer is on its dies and that does not heat itself: the only lag is the effect's.
 fn unit(effects: &[&str], seed: u64) -> RigFile {
-    let mut random = Random::new(seed, "unit");
-    let (gyro, accel) = (bench::gyro(&mut random), bench::accel(&mut random));
-    let mut file = bench::clean(gyro, accel);
+    let mut file = bench::drawn(seed, "unit");
     file.thermal.on_before_s = Some(f64::INFINITY);
     file.thermal.die_lag_s = Some([1.0; 4]);
     file.thermal.die_heating_c = Some([0.0; 4]);
@@ -173,10 +172,7 @@ fn a_sweep_whose_readings_follow_no_input_is_refused_though_they_follow_the_temp
         let refused = fit(recording, only)
             .expect_err("no calibration")
             .to_string();
-        assert!(
-            refused.contains("do not follow the known inputs"),
-            "{refused}"
-        );
+        says(&refused, &["do not follow the known inputs"]);
     }
 }
 
@@ -246,7 +242,6 @@ fn lags(seeds: u64) -> Held {
             }
         }
     }
-    println!("{held:?}");
     held
 }
 
@@ -365,10 +360,7 @@ fn what_the_temperature_does_to_bias_and_scale_in_one_pose_is_named_together() {
             .map(ToString::to_string)
             .collect::<Vec<_>>()
             .join("\n");
-        assert!(
-            notes.contains("fits as well, because the input along the axis"),
-            "{notes}"
-        );
+        says(&notes, &["fits as well, because the input along the axis"]);
     }
 }
 

@@ -2,28 +2,13 @@
 
 use std::fmt::Write as _;
 use std::path::Path;
-use std::process::{Command, Output};
 
 use mimu::noise::noise_file::NoiseFile;
-use mimu_rig::located::Source;
 use mimu_rig::noise::{Coefficients, Noise};
 use mimu_rig::plan::Plan;
 use mimu_rig::rig_file::{RigFile, RigTruth};
 
-fn mimu(folder: &Path, arguments: &str) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_mimu"));
-    command.current_dir(folder).args(arguments.split(' '));
-    command.output().unwrap()
-}
-
-fn refused(folder: &Path, arguments: &str) -> String {
-    let out = mimu(folder, arguments);
-    let error = String::from_utf8(out.stderr).unwrap();
-    assert_eq!(out.status.code(), Some(1), "{arguments}: {error}");
-    assert_eq!(error.lines().count(), 1, "{error}");
-    assert!(out.stdout.is_empty());
-    error
-}
+use super::command::{self, refused};
 
 /// Standard output of a successful command, with `--verbose` for `allan`.
 fn done(folder: &Path, arguments: &str) -> String {
@@ -31,10 +16,7 @@ fn done(folder: &Path, arguments: &str) -> String {
         Some(rest) => &format!("allan --verbose {rest}"),
         None => arguments,
     };
-    let out = mimu(folder, verbose);
-    let error = String::from_utf8(out.stderr).unwrap();
-    assert!(out.status.success(), "{arguments}: {error}");
-    String::from_utf8(out.stdout).unwrap()
+    command::done(folder, verbose)
 }
 
 const RATE_HZ: f64 = 100.0;
@@ -180,73 +162,13 @@ fn recordings_at_several_temperatures_stand_in_one_file_with_theirs() {
     }
 }
 
-#[test]
-fn kalibr_gets_the_worst_axis_and_for_a_walk_that_was_not_seen_its_bound_or_what_is_given() {
-    let folder = tempfile::tempdir().unwrap();
-    write(folder.path(), &at_rest(60_000));
-    done(folder.path(), "allan r -o noise.toml --json a.json");
-    let file = NoiseFile::read(&folder.path().join("noise.toml")).unwrap();
-    let bounds = file.channel[..3].iter().map(|c| c.k_at_most.unwrap());
-    let bound = bounds.fold(0.0, f64::max);
-    done(
-        folder.path(),
-        "export kalibr -o imu.yaml --noise noise.toml",
-    );
-    let yaml = std::fs::read_to_string(folder.path().join("imu.yaml")).unwrap();
-    let walk = yaml
-        .lines()
-        .find(|l| l.starts_with("gyroscope_random_walk"));
-    let walk = walk.unwrap();
-    assert!(
-        walk.contains(&format!("{bound:.6e}")) && walk.contains("not seen, the upper end"),
-        "{yaml}"
-    );
-    done(
-        folder.path(),
-        "export kalibr -o imu.yaml --noise noise.toml --gyro-walk 1e-6 --rostopic /a",
-    );
-    let yaml = std::fs::read_to_string(folder.path().join("imu.yaml")).unwrap();
-    let value = |key: &str| -> f64 {
-        let line = yaml.lines().find(|l| l.starts_with(key)).unwrap();
-        line[key.len() + 1..]
-            .split('#')
-            .next()
-            .unwrap()
-            .trim()
-            .parse()
-            .unwrap()
-    };
-    let json = std::fs::read(folder.path().join("a.json")).unwrap();
-    let json: serde_json::Value = serde_json::from_slice(&json).unwrap();
-    let worst = |from: usize, key: &str| {
-        let channels = json["channels"].as_array().unwrap()[from..from + 3].iter();
-        channels
-            .map(|c| c[key]["value"].as_f64().unwrap())
-            .fold(0.0, f64::max)
-    };
-    for (key, known) in [
-        ("accelerometer_noise_density", worst(3, "n")),
-        ("accelerometer_random_walk", worst(3, "k")),
-        ("gyroscope_noise_density", worst(0, "n")),
-        ("gyroscope_random_walk", 1e-6),
-        ("update_rate", RATE_HZ),
-    ] {
-        assert!(
-            (value(key) / known - 1.0).abs() < 1e-5,
-            "{key}: {} {known}",
-            value(key)
-        );
-    }
-    assert!(yaml.contains("rostopic: \"/a\"") && yaml.contains("given by hand"));
-}
-
 /// Spoils a row, given its number.
 type Spoil = fn(usize, &mut [f64; 7]);
 
 #[test]
 fn what_is_not_at_rest_or_not_alive_is_refused_with_its_place() {
     let rest = at_rest(6000);
-    let cases: [(&str, Spoil, &[&str]); 7] = [
+    let cases: [(&str, Spoil, &[&str]); 3] = [
         (
             "moving",
             |k, row| {
@@ -273,36 +195,6 @@ fn what_is_not_at_rest_or_not_alive_is_refused_with_its_place() {
                 }
             },
             &["accel_y", "stuck at 0.25", "20.00 s"],
-        ),
-        (
-            "all constant",
-            |_, row| row[1..].fill(-0.0),
-            &[
-                "gyro_x, gyro_y",
-                "accel_z",
-                "all 6 channels",
-                "stuck at 0 throughout",
-            ],
-        ),
-        (
-            "moving beside a constant one",
-            |k, row| {
-                row[2] = 0.0;
-                if (4000..4300).contains(&k) {
-                    row[1] += (k as f64).sin()
-                }
-            },
-            &["40.0 s", "gyro_x"],
-        ),
-        ("rate", |_, row| row[0] *= 2.0, &["sample_rate_hz"]),
-        (
-            "backwards",
-            |k, row| {
-                if k == 77 {
-                    row[0] -= 1.0
-                }
-            },
-            &["data row 78", "does not increase"],
         ),
     ];
     for (name, spoil, says) in cases {
@@ -412,26 +304,6 @@ fn a_short_knock_is_masked_and_counted_and_leaves_the_coefficients_as_they_are()
     assert!(
         error.contains("2 of 600 windows of 1.00 s, 0.333 % of the time"),
         "{error}"
-    );
-}
-
-#[test]
-fn readings_in_si_that_are_none_are_said() {
-    let folder = tempfile::tempdir().unwrap();
-    let mut rows = at_rest(6000);
-    for row in &mut rows {
-        row[1] += 1.5;
-        row[6] -= 7.35;
-    }
-    write(folder.path(), &rows);
-    let text = done(folder.path(), "allan r");
-    assert!(
-        text.contains("more than any bias: the unit turns evenly"),
-        "{text}"
-    );
-    assert!(
-        text.contains("accel: raw_unit = \"SI\", but at rest the readings, biases included, are about 0.250 times the input"),
-        "{text}"
     );
 }
 
@@ -574,67 +446,6 @@ fn a_swaying_building_is_set_aside_and_the_noise_beneath_is_exported() {
         folder.path(),
         "export kalibr -o imu.yaml --noise noise.toml",
     );
-}
-
-#[test]
-fn the_sway_of_the_bench_is_found_in_both_level_axes_with_its_size() {
-    let folder = tempfile::tempdir().unwrap();
-    let plan = "format = \"mimu-plan/1\"\nsample_rate_hz = 200.0\ncarrier = \"table\"\nlead_in_s = 1.0\n\
-                [[step]]\nup = [0.0, 0.0, 1.0]\ndwell_s = 300.0\n";
-    let plan = Plan::parse(Source::new("PLAN.toml", plan)).unwrap();
-    let record = |name: &str, mg: f64| {
-        let rig = format!("format = \"mimu-rig/1\"\n[flaws]\nbuilding_mg = {mg:?}\n");
-        let rig = RigFile::parse(&Source::new("RIG.toml", rig)).unwrap();
-        let truth = RigTruth::resolve(&rig, 3).unwrap();
-        let output = mimu_rig::record::Output::new(&folder.path().join(name), &plan).unwrap();
-        mimu_rig::record::write(&plan, &truth, 3, &output).unwrap();
-        let json = done(folder.path(), &format!("allan {name} --from 2 --json -"));
-        let json: serde_json::Value = serde_json::from_str(&json).unwrap();
-        (truth, json)
-    };
-    let (truth, swaying) = record("swaying", 2.0);
-    let (_, quiet) = record("quiet", 0.0);
-    let mut squares = 0.0;
-    for i in 0..6 {
-        let [with, without] = [&swaying, &quiet].map(|json| &json["channels"][i]);
-        let lines = with["lines"].as_array().unwrap();
-        assert_eq!(lines.len(), usize::from(i == 3 || i == 4), "{i}: {lines:?}");
-        assert!(without["lines"].as_array().unwrap().is_empty());
-        if let Some(line) = lines.first() {
-            let volts = line["rms"].as_f64().unwrap();
-            squares += (volts / truth.unit.accel.axes[i - 3].sensitivity).powi(2);
-            assert!((line["frequency_hz"].as_f64().unwrap() - 0.56).abs() < 1e-4);
-        }
-        // The noise is the same, sample by sample. So the coefficients are equal, apart from the few frequencies that were removed.
-        let [a, b] = [with, without].map(|c| c["n"]["value"].as_f64().unwrap());
-        assert!((a / b - 1.0).abs() < 0.01, "{i}: {a} {b}");
-    }
-    // Sinusoids along two level axes.
-    let known = 2.0 * 9.80665e-3;
-    assert!((squares.sqrt() / known - 1.0).abs() < 0.02, "{squares}");
-}
-
-#[test]
-fn at_a_rate_that_has_no_power_of_ten_the_nearest_averaging_times_are_printed() {
-    let folder = tempfile::tempdir().unwrap();
-    let mut rows = at_rest(20_000);
-    for (k, row) in rows.iter_mut().enumerate() {
-        row[0] = k as f64 / 180.0;
-    }
-    write(folder.path(), &rows);
-    let manifest = folder.path().join("r/recording.toml");
-    let text = std::fs::read_to_string(&manifest).unwrap();
-    std::fs::write(&manifest, text.replace("100.0", "180.0")).unwrap();
-    let text = done(folder.path(), "allan r");
-    // 2, 20, 200 and 2000 samples.
-    for time in ["  0.0111 s", "  0.111 s", "  1.11 s", "  11.1 s"] {
-        let rows = text
-            .lines()
-            .filter(|l| l.trim_start().starts_with(time.trim()));
-        // Of gyro and accelerometer; a table that is too wide goes on below.
-        let count = rows.count();
-        assert!((2..=4).contains(&count), "{time}: {text}");
-    }
 }
 
 #[test]

@@ -1,13 +1,15 @@
 //! `mimu report --certificate`: what the page says is what the fit found and what the files state.
 
 use std::path::Path;
-use std::process::{Command, Output};
 
 use mimu_rig::located::Source;
 use mimu_rig::plan::Plan;
 use mimu_rig::record;
 use mimu_rig::rig_file::{RigFile, RigTruth};
 use serde_json::Value;
+
+use super::command::{done, mimu};
+use crate::command::says;
 
 const PARTICULARS: &str = r#"
 format = "mimu-particulars/1"
@@ -41,21 +43,6 @@ mounting_deg = 0.02
 level_deg = 0.01
 rectangular = ["level_deg"]
 "#;
-
-fn mimu(folder: &Path, arguments: &str) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_mimu"))
-        .current_dir(folder)
-        .args(arguments.split(' '))
-        .output()
-        .unwrap()
-}
-
-fn done(folder: &Path, arguments: &str) -> String {
-    let out = mimu(folder, arguments);
-    let said = String::from_utf8_lossy(&out.stderr);
-    assert!(out.status.success(), "mimu {arguments}: {said}");
-    String::from_utf8(out.stdout).unwrap()
-}
 
 /// A recording on the bench's table in `folder`, whose manifest says `more`.
 fn on_table(folder: &Path, name: &str, seed: u64, more: &str) {
@@ -129,29 +116,27 @@ fn a_certificate_has_the_results_of_the_fit_with_their_uncertainties() {
             assert!((k - half / of("sigma")).abs() < 0.006, "{sensor} {name}");
         }
     }
-    for stated in [
-        "2026-117",
-        "Inertial &quot;Laboratory&quot; &lt;Ltd&gt;",
-        "1 Long Road",
-        "SN 4711",
-        "2026-11-20",
-        "rate: frequency standard, PTB 2026-3; level: K-17",
-        "rectangular, limits",
-        "A. Weber, calibration engineer",
-        "The unit was fastened",
-        "new.toml",
-        "What the variance of each parameter consists of",
-    ] {
-        assert!(page.contains(stated), "{stated}");
-    }
+    says(
+        &page,
+        &[
+            "2026-117",
+            "Inertial &quot;Laboratory&quot; &lt;Ltd&gt;",
+            "1 Long Road",
+            "SN 4711",
+            "2026-11-20",
+            "rate: frequency standard, PTB 2026-3; level: K-17",
+            "rectangular, limits",
+            "A. Weber, calibration engineer",
+            "The unit was fastened",
+            "new.toml",
+            "What the variance of each parameter consists of",
+        ],
+    );
     assert!(page.contains("counter(page) \" of \" counter(pages)"));
     // The name of the laboratory is in the style sheet too, and cannot end it.
     assert_eq!(page.matches("</style>").count(), 1);
     // Two sessions of a unit that did not change.
-    assert!(
-        page.contains("parameters changed by more than"),
-        "as found and as left"
-    );
+    says(&page, &["parameters changed by more than"]);
 }
 
 #[test]
@@ -184,19 +169,13 @@ fn the_same_calibration_as_found_has_not_changed_and_another_file_is_refused() {
         "report one --certificate lab.toml --as-found another.toml -o other.html",
     );
     let said = String::from_utf8_lossy(&out.stderr);
-    assert!(
-        said.contains("another.toml: it is of \"another\""),
-        "{said}"
-    );
+    says(&said, &["another.toml: it is of \"another\""]);
     let out = mimu(
         at,
         "report one --certificate lab.toml --calibration two.toml -o other.html",
     );
     let said = String::from_utf8_lossy(&out.stderr);
-    assert!(
-        said.contains("it was made from another recording"),
-        "{said}"
-    );
+    says(&said, &["it was made from another recording"]);
     assert!(!at.join("other.html").exists());
 }
 
@@ -218,8 +197,5 @@ fn one_error_names_all_that_a_certificate_lacks() {
     assert!(!at.join("page.html").exists());
     let out = mimu(at, "report rec rec --certificate lab.toml -o page.html");
     let said = String::from_utf8_lossy(&out.stderr);
-    assert!(
-        said.contains("a certificate is made from one, and 2 are given"),
-        "{said}"
-    );
+    says(&said, &["a certificate is made from one, and 2 are given"]);
 }

@@ -330,37 +330,3 @@ fn the_page_needs_nothing_else_and_escapes_names() {
         assert!(!d.contains("NaN") && !d.contains("inf"), "{d}");
     }
 }
-
-#[test]
-fn where_the_diagnosis_is_refused_there_is_no_page() {
-    let folder = tempfile::tempdir().unwrap();
-    record(folder.path(), "r", "", 1);
-    for (arguments, named) in [
-        (&["diagnose", "nowhere", "--page", "p.html"][..], "nowhere"),
-        (
-            &["diagnose", "r", "--verify", "nowhere", "--page", "p.html"],
-            "nowhere",
-        ),
-        (
-            &["diagnose", "r", "--page", "r/recording.toml/p.html"],
-            "r/recording.toml/p.html",
-        ),
-        (
-            &["diagnose", "r", "--page", "r/recording.toml"],
-            "r/recording.toml",
-        ),
-        (
-            &["diagnose", "r", "--page", "p.html", "--json", "p.html"],
-            "p.html",
-        ),
-    ] {
-        let out = mimu(folder.path(), arguments);
-        let error = String::from_utf8(out.stderr).unwrap();
-        assert_eq!(out.status.code(), Some(1), "{arguments:?}: {error}");
-        assert!(
-            error.lines().count() == 1 && error.contains(named),
-            "{error}"
-        );
-        assert!(!folder.path().join("p.html").exists());
-    }
-}

@@ -2,28 +2,12 @@
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
 
 use serde_json::Value;
 
 use crate::random::Random;
 
-fn mimu(folder: &Path, arguments: &str) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_mimu"));
-    command.current_dir(folder).args(arguments.split(' '));
-    command.output().unwrap()
-}
-
-fn done(folder: &Path, arguments: &str) -> String {
-    let out = mimu(folder, arguments);
-    let error = String::from_utf8(out.stderr).unwrap();
-    assert!(out.status.success(), "{arguments}: {error}");
-    String::from_utf8(out.stdout).unwrap()
-}
-
-fn json(folder: &Path, arguments: &str) -> Value {
-    serde_json::from_str(&done(folder, &format!("{arguments} --json -"))).unwrap()
-}
+use super::command::{done, json, mimu};
 
 fn kind(result: &Value) -> &str {
     result["judgement"]["kind"].as_str().unwrap()

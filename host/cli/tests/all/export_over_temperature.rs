@@ -1,12 +1,11 @@
-//! `mimu export px4` and `ardupilot`: the files are evaluated as the documentation of the two programs describes, and compared with the unit that the
-//! calibration was written for.
+//! `mimu export px4` and `ardupilot` of a calibration over temperature: what remains, and what is refused. `tests/interop` evaluates the files as the two programs do.
 
-use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::Path;
-use std::process::{Command, Output};
 
 use nalgebra::{Matrix3, Vector3};
+
+use super::command;
 
 const G: f64 = 9.80665;
 const RANGE_C: [f64; 2] = [-20.0, 60.0];
@@ -135,151 +134,14 @@ fn write_calibration(folder: &Path) {
     std::fs::write(folder.join("cal.toml"), text).unwrap();
 }
 
-fn export(folder: &Path, arguments: &str) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_mimu"));
-    command.current_dir(folder).arg("export");
-    command.args(arguments.split(' ')).output().unwrap()
-}
-
-/// Exports with the driver's nominal conversion, and reads the output: the parameters and the JSON.
-fn exported(folder: &Path, arguments: &str) -> (BTreeMap<String, f64>, serde_json::Value) {
-    write_calibration(folder);
-    let nominal = "--calibration cal.toml --gyro-zero 2.5 --accel-zero 1.65 --json e.json";
-    let out = export(folder, &format!("{arguments} -o out.param {nominal}"));
-    assert!(
-        out.status.success(),
-        "{}",
-        String::from_utf8_lossy(&out.stderr)
-    );
-    let text = std::fs::read_to_string(folder.join("out.param")).unwrap();
-    let json = std::fs::read(folder.join("e.json")).unwrap();
-    (parameters(&text), serde_json::from_slice(&json).unwrap())
-}
-
-/// As in pymavlink's mavparm: comments begin with a hash, a comma is a space, a line has two words, and the second is a number.
-fn parameters(text: &str) -> BTreeMap<String, f64> {
-    let lines = text.lines().map(str::trim);
-    let lines = lines.filter(|l| !l.is_empty() && !l.starts_with('#'));
-    let pairs = lines.map(|line| {
-        let line = line.replace(',', " ");
-        let words: Vec<&str> = line.split_whitespace().collect();
-        assert_eq!(words.len(), 2, "{line}");
-        assert!(
-            words[0].len() <= 16,
-            "MAVLink names have 16 characters: {line}"
-        );
-        let value: f32 = words[1].parse().unwrap();
-        (words[0].to_owned(), f64::from(value))
-    });
-    pairs.collect()
-}
-
-/// PX4 User Guide, "Thermal Calibration and Compensation": subtracts a cubic of the temperature about TREF, which is clamped to TMIN to TMAX.
-fn px4(
-    p: &BTreeMap<String, f64>,
-    prefix: &str,
-    temp_c: f64,
-    reading: Vector3<f64>,
-) -> Vector3<f64> {
-    let of = |name: &str| p[&format!("{prefix}_{name}")];
-    let d = temp_c.clamp(of("TMIN"), of("TMAX")) - of("TREF");
-    let offset = |axis: usize| -> f64 {
-        (0..4)
-            .map(|k| of(&format!("X{k}_{axis}")) * d.powi(k))
-            .sum()
-    };
-    reading - Vector3::from_fn(|axis, _| offset(axis))
-}
-
-/// Copter documentation, "IMU Temperature Calibration", and the parameter list: subtracts a cubic without a constant about 35 °C, with coefficients
-/// in millionths, relative to its value at the temperature where the offset was found; then the offset.
-fn ardupilot(
-    p: &BTreeMap<String, f64>,
-    short: &str,
-    temp_c: f64,
-    reading: Vector3<f64>,
-) -> Vector3<f64> {
-    let cubic = |temp_c: f64, axis: &str| -> f64 {
-        let d = temp_c.clamp(p["INS_TCAL1_TMIN"], p["INS_TCAL1_TMAX"]) - 35.0;
-        let term = |k: i32| p[&format!("INS_TCAL1_{short}{k}_{axis}")] * d.powi(k);
-        1e-6 * (1..4).map(term).sum::<f64>()
-    };
-    let settled = p[&format!("INS_{short}1_CALTEMP")];
-    Vector3::from_fn(|k, _| {
-        let axis = ["X", "Y", "Z"][k];
-        let change = cubic(temp_c, axis) - cubic(settled, axis);
-        reading[k] - change - p[&format!("INS_{short}OFFS_{axis}")]
-    })
-}
-
-/// The driver's reading of a unit at rest without input, SI, as the export assumes it.
-fn reading(unit: &Unit, temp_c: f64) -> Vector3<f64> {
-    (unit.raw_bias(temp_c) - Vector3::repeat(unit.zero)) / unit.gain
-}
-
-/// The largest deviation from a cubic is the interpolation between nodes: a ten thousandth of the quartic; and single precision.
-const INTERPOLATION: f64 = 1e-5;
-
-fn assert_biases_go(corrected: impl Fn(usize, f64, Vector3<f64>) -> Vector3<f64>) {
-    for (k, unit) in [gyro(), accel()].iter().enumerate() {
-        for temp_c in [-20.0, -14.3, 0.0, 17.0, 33.0, 48.9, 60.0] {
-            let left = corrected(k, temp_c, reading(unit, temp_c));
-            // A fourth power minus its best cubic is 8/35 of a Legendre polynomial.
-            let x = (temp_c - 20.0) / 40.0;
-            let legendre = (35.0 * x.powi(4) - 30.0 * x * x + 3.0) / 8.0;
-            let known = if k == 0 {
-                QUARTIC * 8.0 / 35.0 * legendre
-            } else {
-                0.0
-            };
-            // Sums at equal distances differ slightly from integrals.
-            let tolerance = INTERPOLATION + 0.01 * known.abs();
-            assert!(
-                (left[0] - known).abs() < tolerance,
-                "{k} x {temp_c}: {left} {known}"
-            );
-            assert!(
-                left[1].abs() < INTERPOLATION && left[2].abs() < INTERPOLATION,
-                "{k} {temp_c}: {left}"
-            );
-        }
-        // Outside the range the correction is constant.
-        let [hot, hotter] = [61.0, 90.0].map(|t| corrected(k, t, Vector3::zeros()));
-        assert_eq!(hot, hotter);
-    }
-}
-
-#[test]
-fn px4_subtracts_the_bias_of_the_unit_at_every_temperature() {
-    let folder = tempfile::tempdir().unwrap();
-    let (p, json) = exported(
-        folder.path(),
-        "px4 --imu 2 --gyro-id 2490378 --accel-id 2359306",
-    );
-    assert_eq!((p["TC_G_ENABLE"], p["TC_A_ENABLE"]), (1.0, 1.0));
-    assert_eq!((p["TC_G1_ID"], p["TC_A1_ID"]), (2_490_378.0, 2_359_306.0));
-    assert_eq!(
-        (p["TC_G1_TMIN"], p["TC_G1_TMAX"], p["TC_G1_TREF"]),
-        (-20.0, 60.0, 20.0)
-    );
-    assert_eq!(p.len(), 2 * (2 + 3 + 12));
-    assert_biases_go(|k, t, v| px4(&p, ["TC_G1", "TC_A1"][k], t, v));
-    assert_eq!(json["to"], "px4");
-}
-
-#[test]
-fn ardupilot_subtracts_the_bias_of_the_unit_at_every_temperature() {
-    let folder = tempfile::tempdir().unwrap();
-    let (p, _) = exported(folder.path(), "ardupilot");
-    assert_eq!(p["INS_TCAL1_ENABLE"], 1.0);
-    assert_eq!(p.len(), 3 + 2 * (9 + 1 + 3));
-    assert_biases_go(|k, t, v| ardupilot(&p, ["GYR", "ACC"][k], t, v));
-}
-
 #[test]
 fn the_error_that_remains_is_that_of_scale_factors_cross_terms_and_lag() {
     let folder = tempfile::tempdir().unwrap();
-    let (_, json) = exported(folder.path(), "px4");
+    write_calibration(folder.path());
+    let json = command::json(
+        folder.path(),
+        "export px4 -o out.param --calibration cal.toml --gyro-zero 2.5 --accel-zero 1.65",
+    );
     let figure = |k: usize, source: &str, key: &str| -> f64 {
         let all = json["remaining"].as_array().unwrap();
         let mut all = all.iter().filter(|r| r["sensor"] == ["gyro", "accel"][k]);
@@ -320,8 +182,8 @@ fn q_ground_control_gets_five_columns_with_the_types() {
     let folder = tempfile::tempdir().unwrap();
     write_calibration(folder.path());
     let arguments =
-        "px4 -o a.params --qgc --calibration cal.toml --gyro-zero 2.5 --accel-zero 1.65";
-    assert!(export(folder.path(), arguments).status.success());
+        "export px4 -o a.params --qgc --calibration cal.toml --gyro-zero 2.5 --accel-zero 1.65";
+    command::done(folder.path(), arguments);
     let text = std::fs::read_to_string(folder.path().join("a.params")).unwrap();
     let lines: Vec<&str> = text.lines().filter(|l| !l.starts_with('#')).collect();
     assert!(lines.contains(&"1\t1\tTC_G_ENABLE\t1\t6"), "{text}");
@@ -333,15 +195,9 @@ fn q_ground_control_gets_five_columns_with_the_types() {
 fn what_cannot_be_exported_is_refused_with_what_to_do() {
     let folder = tempfile::tempdir().unwrap();
     let refused = |arguments: &str, says: &str| {
-        let out = export(
-            folder.path(),
-            &format!("{arguments} --calibration cal.toml"),
-        );
-        let error = String::from_utf8(out.stderr).unwrap();
-        assert!(
-            out.status.code() == Some(1) && error.contains(says),
-            "{error}"
-        );
+        let arguments = format!("export {arguments} --calibration cal.toml");
+        let error = command::refused(folder.path(), &arguments);
+        assert!(error.contains(says), "{error}");
         assert!(!folder.path().join("p.param").exists());
     };
     write_calibration(folder.path());

@@ -1,27 +1,9 @@
 //! The first minutes of a user: a log in, a file out, and what the command says when something is given in the wrong place.
 
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::path::PathBuf;
 
-fn mimu(folder: &Path, arguments: &str) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_mimu"));
-    command.current_dir(folder);
-    command.args(arguments.split_whitespace()).output().unwrap()
-}
-
-fn right(folder: &Path, arguments: &str) -> String {
-    let out = mimu(folder, arguments);
-    let error = String::from_utf8_lossy(&out.stderr).into_owned();
-    assert!(out.status.success(), "mimu {arguments}: {error}");
-    String::from_utf8(out.stdout).unwrap()
-}
-
-fn refused(folder: &Path, arguments: &str) -> String {
-    let out = mimu(folder, arguments);
-    let error = String::from_utf8(out.stderr).unwrap();
-    assert_eq!(out.status.code(), Some(1), "mimu {arguments}: {error}");
-    error.lines().last().unwrap_or_default().to_owned()
-}
+use super::command::{done, mimu, refused};
+use crate::command::says;
 
 fn json(text: &str) -> serde_json::Value {
     serde_json::from_str(text).unwrap_or_else(|error| panic!("{error}: {text}"))
@@ -35,13 +17,13 @@ fn log() -> tempfile::TempDir {
     for name in ["accel.txt", "gyro.txt"] {
         std::fs::copy(example.join(name), at.join(name)).unwrap();
     }
-    right(
+    done(
         at,
         "import accel.txt gyro.txt --columns t_s,accel_x,accel_y,accel_z --columns t_s,gyro_x,gyro_y,gyro_z --raw-unit count \
          --gravity 9.80665 -o counts",
     );
-    right(at, "fit counts -o counts.toml");
-    right(
+    done(at, "fit counts -o counts.toml");
+    done(
         at,
         "apply counts --calibration counts.toml --format csv -o clean",
     );
@@ -56,10 +38,10 @@ fn log() -> tempfile::TempDir {
 fn a_log_becomes_a_header_in_two_commands_and_nothing_is_replaced_by_mistake() {
     let folder = log();
     let at = folder.path();
-    let said = right(at, "fit log.csv -o cal.toml --save rec");
+    let said = done(at, "fit log.csv -o cal.toml --save rec");
     assert!(said.contains("calibration: cal.toml"), "{said}");
-    right(at, "export c cal.toml -o cal.h");
-    right(at, "export c --calibration cal.toml -o again.h");
+    done(at, "export c cal.toml -o cal.h");
+    done(at, "export c --calibration cal.toml -o again.h");
     let [one, other] = ["cal.h", "again.h"].map(|name| std::fs::read(at.join(name)).unwrap());
     assert_eq!(one, other);
     let out = mimu(at, "export c cal.toml --calibration cal.toml -o third.h");
@@ -72,8 +54,8 @@ fn a_log_becomes_a_header_in_two_commands_and_nothing_is_replaced_by_mistake() {
     assert_eq!(error, said);
     assert_eq!(refused(at, "diagnose rec -o cal.toml"), said);
     assert_eq!(std::fs::read(at.join("cal.toml")).unwrap(), before);
-    right(at, "fit rec -o cal.toml --replace");
-    right(at, "verify log.csv --calibration cal.toml");
+    done(at, "fit rec -o cal.toml --replace");
+    done(at, "verify log.csv --calibration cal.toml");
 }
 
 #[test]
@@ -81,7 +63,7 @@ fn a_file_in_the_wrong_place_is_called_what_it_is() {
     let folder = log();
     let at = folder.path();
     std::fs::write(at.join("noise.toml"), "format = \"mimu-noise/1\"\n").unwrap();
-    right(at, "design -n 12 --reference gravity -o plan.toml");
+    done(at, "design -n 12 --reference gravity -o plan.toml");
     let error = refused(at, "verify counts --calibration noise.toml");
     let said = "mimu: noise.toml: this is a noise file (`mimu allan -o`); give a calibration (`mimu fit -o`)";
     assert_eq!(error, said);
@@ -117,12 +99,12 @@ fn every_refusal_on_standard_output_is_json_with_its_judgement() {
     let text = std::fs::read_to_string(at.join("log.csv")).unwrap();
     let still: Vec<&str> = text.lines().take(100).collect();
     std::fs::write(at.join("still.csv"), still.join("\n")).unwrap();
-    right(at, "import still.csv --units m/s2,rad/s -o still");
+    done(at, "import still.csv --units m/s2,rad/s -o still");
     let refusal = of("fit still --json -");
     let kind = refusal["judgement"]["kind"].as_str().unwrap();
     assert!(["untested", "suspect"].contains(&kind), "{refusal}");
     // A result that is refused afterwards is printed once, as a result.
-    let out = right(at, "fit counts --json -");
+    let out = done(at, "fit counts --json -");
     assert_eq!(json(&out)["format"], "mimu-fit/1");
 }
 
@@ -152,13 +134,13 @@ fn units_that_are_given_hold_for_named_columns_too() {
     let rows: Vec<String> = text.lines().skip(1).map(row).collect();
     std::fs::write(at.join("bare.csv"), rows.join("\n")).unwrap();
     let list = "--columns t_s,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z";
-    right(
+    done(
         at,
         &format!("import bare.csv {list} --units g,deg/s -o bare"),
     );
     let manifest = std::fs::read_to_string(at.join("bare/recording.toml")).unwrap();
     assert!(manifest.contains("raw_unit = \"SI\""), "{manifest}");
-    let fit = json(&right(at, "fit bare --json -"));
+    let fit = json(&done(at, "fit bare --json -"));
     let scale = &fit["sensors"]["accel"]["parameters"];
     let scale = scale
         .as_array()
@@ -171,24 +153,18 @@ fn units_that_are_given_hold_for_named_columns_too() {
         "{scale}"
     );
     let error = refused(at, &format!("import bare.csv {list} -o again"));
-    assert!(
-        error.contains("--units UNITS, which is count, V, or as g,deg/s"),
-        "{error}"
-    );
+    says(&error, &["--units UNITS, which is count, V, or as g,deg/s"]);
     let error = refused(
         at,
         &format!("import bare.csv {list} --units g,count -o again"),
     );
-    assert!(
-        error.contains("a recording has one unit for both"),
-        "{error}"
-    );
+    says(&error, &["a recording has one unit for both"]);
 }
 
 #[test]
 fn poses_for_hands_are_in_words_and_say_whose_noise_is_assumed() {
     let folder = tempfile::tempdir().unwrap();
-    let text = right(
+    let text = done(
         folder.path(),
         "design -n 12 --reference gravity --table hand",
     );
@@ -197,15 +173,12 @@ fn poses_for_hands_are_in_words_and_say_whose_noise_is_assumed() {
         "{text}"
     );
     assert!(text.contains("up to 25 degrees off"), "{text}");
-    assert!(
-        text.contains("that of an MMA7260QT: --noise takes yours"),
-        "{text}"
-    );
+    says(&text, &["that of an MMA7260QT: --noise takes yours"]);
     assert!(
         text.lines().all(|line| line.chars().count() <= 100),
         "{text}"
     );
-    let design = json(&right(
+    let design = json(&done(
         folder.path(),
         "design -n 12 --reference gravity --json -",
     ));
@@ -232,7 +205,7 @@ fn poses_for_hands_are_in_words_and_say_whose_noise_is_assumed() {
 fn a_table_is_compensated_into_a_table_with_its_stamps_and_its_other_columns() {
     let folder = log();
     let at = folder.path();
-    right(at, "fit log.csv -o cal.toml");
+    done(at, "fit log.csv -o cal.toml");
     let text = std::fs::read_to_string(at.join("log.csv")).unwrap();
     let row = |(k, line): (usize, &str)| match k {
         0 => format!("{line},mode (a)\n"),
@@ -241,9 +214,9 @@ fn a_table_is_compensated_into_a_table_with_its_stamps_and_its_other_columns() {
     };
     let more: String = text.lines().enumerate().map(row).collect();
     std::fs::write(at.join("more.csv"), more).unwrap();
-    let said = right(at, "apply more.csv --calibration cal.toml -o made/out.csv");
+    let said = done(at, "apply more.csv --calibration cal.toml -o made/out.csv");
     assert!(said.starts_with("made/out.csv: "), "{said}");
-    right(
+    done(
         at,
         "apply more.csv --calibration cal.toml --format csv -o clean2",
     );
@@ -277,7 +250,7 @@ fn a_table_is_compensated_into_a_table_with_its_stamps_and_its_other_columns() {
     let error = refused(at, "apply more.csv --calibration cal.toml -o made/out.csv");
     assert!(error.ends_with("replace it (--replace)"), "{error}");
     // What is imported in full again is a recording in SI.
-    right(at, "import made/out.csv -o again");
+    done(at, "import made/out.csv -o again");
 }
 
 #[test]
@@ -289,9 +262,9 @@ fn messages_about_a_log_name_the_log() {
     std::fs::write(at.join("still.csv"), still.join("\n")).unwrap();
     let error = refused(at, "fit still.csv --units m/s2,rad/s");
     assert!(error.starts_with("mimu: still.csv, "), "{error}");
-    let found = json(&right(at, "fit log.csv --json -"));
+    let found = json(&done(at, "fit log.csv --json -"));
     assert!(!found.to_string().contains("samples.parquet"), "{found}");
-    let found = json(&right(at, "allan still.csv --units m/s2,rad/s --json -"));
+    let found = json(&done(at, "allan still.csv --units m/s2,rad/s --json -"));
     assert!(!found.to_string().contains("/still.csv"), "{found}");
 }
 
@@ -307,9 +280,9 @@ fn a_command_takes_the_options_of_the_import_for_a_log() {
     let error = refused(at, "fit broken.csv --units m/s2,rad/s");
     assert!(error.ends_with("(--skip-broken)"), "{error}");
     let options = "broken.csv --units m/s2,rad/s --skip-broken=1 --rows ..6000 --device lab";
-    right(at, &format!("import {options} --gravity 9.8 -o lab"));
-    let of_log = json(&right(at, &format!("fit {options} --gravity 9.8 --json -")));
-    let of_recording = json(&right(at, "fit lab --json -"));
+    done(at, &format!("import {options} --gravity 9.8 -o lab"));
+    let of_log = json(&done(at, &format!("fit {options} --gravity 9.8 --json -")));
+    let of_recording = json(&done(at, "fit lab --json -"));
     assert_eq!(of_log["sensors"], of_recording["sensors"]);
     assert_eq!(of_log["device"], "lab");
     // The command to complete is the one that was typed. A recording is put right by another import.
@@ -320,33 +293,5 @@ fn a_command_takes_the_options_of_the_import_for_a_log() {
     )
     .unwrap();
     let error = refused(at, "allan names.csv -o n.toml");
-    assert!(
-        error.contains("say it: mimu allan names.csv -o n.toml --"),
-        "{error}"
-    );
-}
-
-#[test]
-fn a_suspicion_about_readings_names_the_option_that_trusts_them() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
-    let row = |k: usize| {
-        let far = if k.is_multiple_of(2) { 50.0 } else { 0.0 };
-        let noise = |c: usize| 0.01 * ((k * (c + 3) + k / 7) % 5) as f64;
-        let cells: Vec<String> = (0..6).map(|c| format!("{:.3}", far + noise(c))).collect();
-        format!("{},{}\n", 10 * k, cells.join(","))
-    };
-    let rows: String = (0..400).map(row).collect();
-    std::fs::write(at.join("two.csv"), format!("ms,gx,gy,gz,ax,ay,az\n{rows}")).unwrap();
-    let import = "import two.csv --raw-unit count -o two";
-    let error = refused(at, import);
-    assert!(
-        error.contains("if the readings are right, say so") && error.contains("--trust-readings"),
-        "{error}"
-    );
-    let said = right(at, &format!("{import} --trust-readings"));
-    assert!(
-        said.contains("alternate") && said.contains("--trust-readings"),
-        "{said}"
-    );
+    says(&error, &["say it: mimu allan names.csv -o n.toml --"]);
 }

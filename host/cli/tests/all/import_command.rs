@@ -1,79 +1,33 @@
 //! `mimu import` of files from makers and users: their layouts, and tables of means.
 
 use std::fmt::Write as _;
-use std::path::Path;
-use std::process::Command;
 
 use crate::random::congruential;
 
-fn mimu(folder: &Path, arguments: &str) -> (bool, String, String) {
-    let out = Command::new(env!("CARGO_BIN_EXE_mimu"))
-        .current_dir(folder)
-        .args(arguments.split_whitespace())
-        .output()
-        .unwrap();
-    let [stdout, stderr] = [out.stdout, out.stderr].map(|o| String::from_utf8(o).unwrap());
-    (out.status.success(), stdout, stderr)
-}
-
-fn right(folder: &Path, arguments: &str) -> String {
-    let (done, stdout, stderr) = mimu(folder, arguments);
-    assert!(done, "mimu {arguments}: {stderr}");
-    stdout
-}
-
-/// The one-line refusal of `arguments`.
-fn refused(folder: &Path, arguments: &str) -> String {
-    let (done, _, stderr) = mimu(folder, arguments);
-    let last = stderr.lines().last().unwrap_or_default().to_owned();
-    assert!(
-        !done && last.starts_with("mimu: "),
-        "mimu {arguments}: {stderr}"
-    );
-    last
-}
+use super::command::{done, refused};
 
 #[test]
-fn a_preset_is_reported_and_what_it_leaves_open_is_asked_for() {
+fn a_preset_is_reported() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let mut phyphox = String::from(
         "\"Time (s)\"\t\"Acceleration x (m/s^2)\"\t\"Acceleration y (m/s^2)\"\t\"Acceleration z (m/s^2)\"\n",
     );
-    let mut plain = String::new();
     for i in 0..20 {
         let t = 0.01 * f64::from(i);
         writeln!(phyphox, "{t:.3}\t0.1\t0.2\t9.8").unwrap();
-        writeln!(plain, "{t:.3} 1 2 3").unwrap();
     }
     std::fs::write(folder.join("Raw Data.csv"), phyphox).unwrap();
-    std::fs::write(folder.join("acc.txt"), plain).unwrap();
     let gravity = "--reference gravity --gravity 9.81 -o";
-    let text = right(folder, &format!("import . {gravity} recording"));
+    let text = done(folder, &format!("import . {gravity} recording"));
     assert!(
         text.contains("preset phyphox, recognised by the header"),
         "{text}"
     );
-    let json = right(folder, &format!("import . --json - {gravity} again"));
+    let json = done(folder, &format!("import . --json - {gravity} again"));
     let json: serde_json::Value = serde_json::from_str(&json).unwrap();
     assert_eq!(json["preset"]["name"], "phyphox");
     assert_eq!(json["preset"]["recognised"], true);
-    let error = refused(
-        folder,
-        &format!("import acc.txt --preset imu_tk {gravity} tk"),
-    );
-    assert!(
-        error.contains("the unit of the readings is unknown"),
-        "{error}"
-    );
-    let error = refused(
-        folder,
-        &format!("import acc.txt --preset phyphox {gravity} tk"),
-    );
-    assert!(
-        error.contains("Time (s)") && error.contains("(--columns)"),
-        "{error}"
-    );
 }
 
 /// Six faces and six edges of an accelerometer of 800 counts per m/s² with a bias of 50 counts on x.
@@ -118,18 +72,18 @@ fn a_table_of_means_is_fitted_and_verified_and_everything_that_needs_samples_ref
             false => "",
         };
         let list = format!("step=pose,accel_x=ax,accel_y=ay,accel_z=az{noise}");
-        let text = right(
+        let text = done(
             folder,
             &format!(
                 "import poses.csv --means --columns {list} --raw-unit count --reference gravity --gravity 9.81 -o poses"
             ),
         );
         assert!(text.contains("means of 12 poses"), "{text}");
-        let text = right(folder, "fit poses --dwells");
+        let text = done(folder, "fit poses --dwells");
         assert!(text.contains("means of 12 poses, gravity 9.81"), "{text}");
         assert_eq!(text.contains("taken as the noise"), !with_noise, "{text}");
         assert!(!text.contains("NaN"), "{text}");
-        let json = right(folder, "fit poses --json - -o cal.toml");
+        let json = done(folder, "fit poses --json - -o cal.toml");
         let json: serde_json::Value = serde_json::from_str(&json).unwrap();
         assert_eq!(json["means"], true);
         assert_eq!(json["dwells"][3]["label"], "p3");
@@ -152,11 +106,11 @@ fn a_table_of_means_is_fitted_and_verified_and_everything_that_needs_samples_ref
             corners += &corner([1, 2, 4].map(|bit| if code & bit == 0 { 1.0 } else { -1.0 }));
         }
         std::fs::write(folder.join("corners.csv"), corners).unwrap();
-        right(
+        done(
             folder,
             "import corners.csv --means --raw-unit count --reference gravity --gravity 9.81 --replace -o corners",
         );
-        let json = right(folder, "verify corners --calibration cal.toml --json -");
+        let json = done(folder, "verify corners --calibration cal.toml --json -");
         let json: serde_json::Value = serde_json::from_str(&json).unwrap();
         let rms = json["sensors"]["accel"]["rms"].as_f64().unwrap();
         let expected = 8.0 / 800.0 / 3_f64.sqrt();
@@ -208,11 +162,11 @@ fn rests_between_turns_of_known_angle_show_the_noise_and_are_no_outliers() {
         "step,turn_x_deg,turn_y_deg,turn_z_deg\n0,0,0,0\n1,360,0,0\n2,0,0,0\n3,0,360,0\n4,0,0,0\n5,0,0,360\n",
     )
     .unwrap();
-    right(
+    done(
         folder,
         "import log.csv --columns step,gyro_x,gyro_y,gyro_z --scale gyro=0.01745329252 --rate-hz 100 --raw-unit SI --reference table --inputs inputs.csv --gravity 9.81 -o turns",
     );
-    let json = right(folder, "fit turns --json -");
+    let json = done(folder, "fit turns --json -");
     let json: serde_json::Value = serde_json::from_str(&json).unwrap();
     let floor = json["sensors"]["gyro"]["noise_floor"].as_f64();
     let floor = floor.expect("rests of 20 s show the noise").to_degrees();
@@ -222,7 +176,7 @@ fn rests_between_turns_of_known_angle_show_the_noise_and_are_no_outliers() {
         (floor / expected - 1.0).abs() < 0.2,
         "{floor} and not {expected}"
     );
-    let text = right(folder, "fit turns --verbose");
+    let text = done(folder, "fit turns --verbose");
     // The three turns are fitted exactly, and the rests differ by their biases: neither is an outlier.
     assert!(!text.contains("times the median"), "{text}");
     assert!(text.contains("the residual exceeds the noise"), "{text}");
@@ -261,7 +215,7 @@ fn a_file_for_each_face_calibrates_the_accelerometer_and_says_why_there_is_no_gy
     let columns = "--columns t_s=t,gyro_x=gx,gyro_y=gy,gyro_z=gz,accel_x=ax,accel_y=ay,accel_z=az --raw-unit SI --gravity 9.81";
     let faces =
         "--faces +x=x_up.csv -x=x_down.csv +y=y_up.csv -y=y_down.csv +z=z_up.csv -z=z_down.csv";
-    let text = right(
+    let text = done(
         folder,
         &format!("import {faces} {columns} --reference table -o six"),
     );
@@ -270,11 +224,11 @@ fn a_file_for_each_face_calibrates_the_accelerometer_and_says_why_there_is_no_gy
         "{text}"
     );
     assert!(!text.contains("have no file"), "{text}");
-    let json = right(folder, "fit six --json -");
+    let json = done(folder, "fit six --json -");
     let json: serde_json::Value = serde_json::from_str(&json).unwrap();
     let sensors: Vec<&String> = json["sensors"].as_object().unwrap().keys().collect();
     assert_eq!(sensors, ["accel"]);
-    let text = right(folder, "fit six");
+    let text = done(folder, "fit six");
     let factors = text
         .lines()
         .find(|line| line.contains("scale factor"))
@@ -296,43 +250,31 @@ fn a_file_for_each_face_calibrates_the_accelerometer_and_says_why_there_is_no_gy
         "{text}"
     );
 
-    let text = right(
+    let text = done(
         folder,
         &format!(
             "import --faces +x=x_up.csv -x=x_down.csv -z=z_down.csv {columns} --reference table -o three"
         ),
     );
     assert!(text.contains("the faces +y, -y, +z have no file"), "{text}");
-    let text = right(
+    let text = done(
         folder,
         &format!("import {faces} {columns} --reference gravity -o by_gravity"),
     );
     assert!(text.contains("six faces do not determine"), "{text}");
-    let text = right(folder, "fit by_gravity");
+    let text = done(folder, "fit by_gravity");
     assert!(text.contains("judgement: untested"), "{text}");
     assert!(
         text.contains("accel: not calibrated, because nothing here shows it: non-orthogonality"),
         "{text}"
     );
-    let error = refused(
-        folder,
-        &format!("import --faces x_up.csv {columns} --reference table -o bad"),
-    );
-    assert!(error.contains("write it like +x=x_up.csv"), "{error}");
-    let error = refused(
-        folder,
-        &format!("import --faces +w=x_up.csv {columns} --reference table -o bad"),
-    );
-    assert!(error.contains("is not a face"), "{error}");
-    // Typing errors.
     for (faces, says) in [
-        (
-            "+x= -x=x_down.csv",
-            "+x: no file is given for this face; write it like +x=FILE",
-        ),
+        ("x_up.csv", "write it like +x=x_up.csv"),
+        ("+w=x_up.csv", "is not a face"),
+        ("+x= -x=x_down.csv", "+x: no file is given for this face"),
         (
             "+y=y_up.csv -y=y_up.csv",
-            "y_up.csv: it is given for the faces +y and -y; give the recording of each face",
+            "it is given for the faces +y and -y",
         ),
     ] {
         let error = refused(
@@ -340,58 +282,5 @@ fn a_file_for_each_face_calibrates_the_accelerometer_and_says_why_there_is_no_gy
             &format!("import --faces {faces} {columns} --reference table -o bad"),
         );
         assert!(error.contains(says), "{error}");
-        assert!(!folder.join("bad").exists());
     }
-}
-
-#[test]
-fn flags_that_an_import_needs_are_named_where_it_is_refused() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
-    let fixture = concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/../recording/src/import/ardupilot/fixtures/two-sensors.bin"
-    );
-    std::fs::copy(fixture, folder.join("flight.bin")).unwrap();
-    let gravity = "--reference gravity --gravity 9.81 -o";
-    let error = refused(folder, &format!("import flight.bin {gravity} a"));
-    assert!(
-        error.contains("IMU instance 1") && error.contains("--instance"),
-        "{error}"
-    );
-    // Its unit is known, and the output reports what was undone.
-    let text = right(
-        folder,
-        &format!("import flight.bin --instance 0 --topic IMU {gravity} a"),
-    );
-    assert!(
-        text.contains("ArduPilot's calibration undone: gyro offset"),
-        "{text}"
-    );
-    let rows: String = (0..60)
-        .map(|i| format!("{},{},1,2,{i}\n", i % 3, 10 * (i / 3)))
-        .collect();
-    std::fs::write(
-        folder.join("three.csv"),
-        format!("channel,ms,a,b,c\n{rows}"),
-    )
-    .unwrap();
-    let list = "--columns t_s=ms,accel_x=a,accel_y=b,accel_z=c --raw-unit count";
-    let text = right(
-        folder,
-        &format!("import three.csv --where channel=1 {list} {gravity} b"),
-    );
-    assert!(
-        text.contains("20 rows at 100 Hz")
-            && text.contains("40 rows left out: not chosen by --where"),
-        "{text}"
-    );
-    let error = refused(
-        folder,
-        &format!("import three.csv --where channel=9 {list} {gravity} c"),
-    );
-    assert!(
-        error.contains("the column has \"0\", \"1\", \"2\"") && error.contains("(--where)"),
-        "{error}"
-    );
 }

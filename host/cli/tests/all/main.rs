@@ -5,6 +5,7 @@ mod allan_command;
 mod bad_input;
 mod biases_at_rest;
 mod certificate;
+mod command;
 mod design_command;
 mod design_with_a_prior;
 mod device;

@@ -123,35 +123,3 @@ fn covariance_in_the_file_is_that_of_the_sigmas_and_has_no_negative_direction() 
         assert!(smallest > -1e-9, "{sensor}: {smallest:e}");
     }
 }
-
-#[test]
-fn a_fit_of_the_same_recording_gives_the_same_calibration() {
-    let folder = tempfile::tempdir().unwrap();
-    let first = fitted(folder.path());
-    let again: serde_json::Value =
-        serde_json::from_str(&mimu(folder.path(), &["fit", "recording", "--json", "-"])).unwrap();
-    assert_eq!(first["sensors"], again["sensors"]);
-}
-
-#[test]
-fn verifying_the_recording_that_was_fitted_gives_its_figures_and_says_so() {
-    let folder = tempfile::tempdir().unwrap();
-    let fit = fitted(folder.path());
-    let text = mimu(
-        folder.path(),
-        &[
-            "verify",
-            "recording",
-            "--calibration",
-            "cal.toml",
-            "--json",
-            "-",
-        ],
-    );
-    let verified: serde_json::Value = serde_json::from_str(&text).unwrap();
-    for sensor in ["gyro", "accel"] {
-        let [a, b] = [&fit, &verified].map(|v| v["sensors"][sensor]["rms"].as_f64().unwrap());
-        assert!((a / b - 1.0).abs() < 1e-9, "{sensor}: {a} {b}");
-    }
-    assert!(verified["warnings"].to_string().contains("made from"));
-}

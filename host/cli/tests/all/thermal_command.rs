@@ -1,24 +1,12 @@
 //! The command `mimu thermal fit` on niu's unit and procedure, with the bench's truth.
 
 use std::path::Path;
-use std::process::{Command, Output};
 
 use mimu_rig::plan::Plan;
 use mimu_rig::rig_file::{RigFile, RigTruth};
 use serde_json::Value;
 
-fn mimu(folder: &Path, arguments: &str) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_mimu"));
-    command.current_dir(folder);
-    command.args(arguments.split(' ')).output().unwrap()
-}
-
-fn done(folder: &Path, arguments: &str) -> String {
-    let out = mimu(folder, arguments);
-    let told = String::from_utf8_lossy(&out.stderr).into_owned();
-    assert!(out.status.success(), "{arguments}: {told}");
-    String::from_utf8(out.stdout).unwrap()
-}
+use super::command::{done, mimu};
 
 /// niu's MTi-G in its chamber: always the same unit; `noise` is the seed of the noise.
 fn record(folder: &Path, name: &str, noise: u64) {
@@ -147,7 +135,6 @@ fn niu_s_unit_gets_curves_and_lags_that_hold_the_truth_and_another_run_agrees() 
         ),
     ] {
         let [short, all] = [short, verbose].map(|arguments| done(folder, arguments));
-        println!("{short}");
         assert!(short.lines().count() <= 25, "{short}");
         assert!(all.lines().count() > short.lines().count(), "{all}");
         let sentences = ["verdict:", "judgement:", "warning:", "next:"];
@@ -189,15 +176,6 @@ fn niu_s_unit_gets_curves_and_lags_that_hold_the_truth_and_another_run_agrees() 
         curves < 0.5 * one,
         "{curves} rad/s with curves, {one} without"
     );
-}
-
-#[test]
-fn what_is_no_recording_over_temperature_is_refused_and_nothing_is_written() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
-    let out = mimu(folder, "thermal fit nowhere -o cal.toml --plot curves.svg");
-    assert_eq!(out.status.code(), Some(1));
-    assert!(!folder.join("cal.toml").exists() && !folder.join("curves.svg").exists());
 }
 
 /// The session of an autopilot's user: poses at room temperature, and an hour or two at rest while the unit warms up and cools.
@@ -247,7 +225,6 @@ fn a_rest_ramp_upon_poses_at_room_temperature_halves_the_error_of_a_sweep_and_is
         result["sensors"]["gyro"]["rms"].as_f64().unwrap()
     };
     let [with, without] = [left("cal.toml"), left("room.toml")];
-    println!("{without} rad/s with room.toml, {with} with the curves");
     assert!(with < 0.5 * without, "{without}, {with}");
     let exported = done(
         folder,

@@ -1,15 +1,15 @@
 //! The command `mimu thermal plan`: the bench reads its output.
 
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Output;
 
 use mimu_rig::plan::{Plan, Pose};
 use mimu_rig::table::{Table, TableTruth};
 
+use super::command;
+
 fn mimu(folder: &Path, arguments: &str) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_mimu"));
-    command.current_dir(folder).args(["thermal", "plan"]);
-    command.args(arguments.split(' ')).output().unwrap()
+    command::mimu(folder, &format!("thermal plan {arguments}"))
 }
 
 fn planned(folder: &Path, arguments: &str) -> (Plan, serde_json::Value) {
@@ -43,26 +43,6 @@ fn the_bench_reads_every_procedure_and_its_table_can_carry_it_out() {
         // The bench refuses rounds that take too long, and poses out of reach.
         Table::new(&plan, &TableTruth::ideal()).unwrap();
     }
-}
-
-#[test]
-fn a_soak_measures_at_the_end_of_every_set_point() {
-    let folder = tempfile::tempdir().unwrap();
-    let (plan, json) = planned(
-        folder.path(),
-        "--procedure soak --range -10..70 --points 5 --soak 45",
-    );
-    assert_eq!(plan.rounds, 5);
-    let length = plan.round_s.unwrap();
-    for round in 0..5 {
-        let begin = plan.lead_in_s + f64::from(round) * length;
-        let set_point = -10.0 + 20.0 * f64::from(round);
-        assert_eq!(plan.chamber_c(begin), set_point);
-        // After the end of the ramp, at 2 K/min, the unit has had most of 45 minutes.
-        assert_eq!(plan.chamber_c(begin - 1800.0), set_point);
-    }
-    let hours = json["duration_s"].as_f64().unwrap() / 3600.0;
-    assert!((hours - (5.0 * 0.75 + 4.0 / 6.0)).abs() < 0.01, "{hours}");
 }
 
 #[test]

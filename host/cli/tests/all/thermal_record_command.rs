@@ -112,6 +112,7 @@ fn by_the_bench(plan: &str, truth: &RigTruth) -> Inputs {
 }
 
 #[test]
+#[ignore = "nightly: minutes of the emulated board; by day `device::thermal_record` records every input"]
 fn a_plan_is_carried_out_and_its_recording_has_the_inputs_of_the_bench_and_is_fitted() {
     let bench = Bench::new("table", brisk(11), 11);
     let plan = sweep();
@@ -167,13 +168,11 @@ fn a_plan_is_carried_out_and_its_recording_has_the_inputs_of_the_bench_and_is_fi
     assert!(out.status.success(), "{}", self::told(&out));
     let fit = json(&bench.path("fit.json"));
     let range = &fit["range_c"];
-    println!("{told}\n{}", fit["sensors"]);
     // By self-heating the dies are warmer than the chamber.
     let span = range[1].as_f64().unwrap() - range[0].as_f64().unwrap();
     assert!((10.0..14.0).contains(&span), "{range}");
     let calibration = Calibration::read(&bench.path("cal.toml")).unwrap();
     let [gyro, accel] = errors(&calibration, &bench.truth);
-    println!("errors: gyro {gyro:.5} rad/s, accel {accel:.5} m/s²");
     // As for a session of the wizard: 18 dwells of 2.5 s instead of twelve of 1 s, but also a slope over temperature.
     assert!(gyro < 0.2f64.to_radians() && accel < 0.02, "{gyro} {accel}");
 }
@@ -190,6 +189,7 @@ fn recording(bench: &Bench, name: &str, bytes: u64, child: &mut Child) {
 }
 
 #[test]
+#[ignore = "nightly: the emulated board; by day `device::thermal_record` interrupts one with a scripted device"]
 fn a_procedure_that_is_interrupted_or_loses_its_power_keeps_what_it_has_and_leaves_the_chamber_safe()
  {
     let mut bench = Bench::new("table", brisk(12), 12);

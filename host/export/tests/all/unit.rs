@@ -5,27 +5,12 @@ use std::fmt::Write as _;
 use mimu::calibration::Calibration;
 use nalgebra::{Matrix3, Vector3};
 
+#[rustfmt::skip]
 const EFFECTS: [(&str, &str, &str); 4] = [
-    (
-        "gyro_g_sensitivity",
-        "",
-        r#"{ name = "xz", value = 4e-4, unit = "rad/s/(m/s^2)" }"#,
-    ),
-    (
-        "accel_scale_cubic",
-        "",
-        r#"{ name = "y", value = 4e-5, unit = "1/(m/s^2)^2" }"#,
-    ),
-    (
-        "gyro_thermal_lag",
-        r#"nonlinear_parameter = { name = "lag_s", value = 90.0 }"#,
-        r#"{ name = "z", value = 2e-3, unit = "rad/s/K" }"#,
-    ),
-    (
-        "term:gyro_y~rate_x*force_z^2",
-        "",
-        r#"{ name = "y", value = 1e-4, unit = "rad/s/((rad/s)*(m/s^2)*(m/s^2))" }"#,
-    ),
+    ("gyro_g_sensitivity", "", r#"{ name = "xz", value = 4e-4, unit = "rad/s/(m/s^2)" }"#),
+    ("accel_scale_cubic", "", r#"{ name = "y", value = 4e-5, unit = "1/(m/s^2)^2" }"#),
+    ("gyro_thermal_lag", r#"nonlinear_parameter = { name = "lag_s", value = 90.0 }"#, r#"{ name = "z", value = 2e-3, unit = "rad/s/K" }"#),
+    ("term:gyro_y~rate_x*force_z^2", "", r#"{ name = "y", value = 1e-4, unit = "rad/s/((rad/s)*(m/s^2)*(m/s^2))" }"#),
 ];
 
 fn rows(m: &Matrix3<f64>) -> String {

@@ -37,35 +37,19 @@ fn by_hand_no_input_is_known() {
 
 #[test]
 fn what_has_no_input_is_refused_by_its_step() {
-    for (steps, words) in [
+    #[rustfmt::skip]
+    let cases = [
         ("[[step]]\nposes = 3\ndwell_s = 1.0\n", "[[step]] 1: poses"),
-        (
-            "[[step]]\nup = [1.0, 0.0, 0.0]\nspin_dps = 1.0\ndwell_s = 1.0\n",
-            "not constant",
-        ),
+        ("[[step]]\nup = [1.0, 0.0, 0.0]\nspin_dps = 1.0\ndwell_s = 1.0\n", "not constant"),
         ("[[step]]\ndwell_s = 1.0\n", "up or poses"),
-        (
-            "[[step]]\nup = [0.0, 0.0, 1.0]\ndwell_s = -1.0\n",
-            "dwell_s",
-        ),
+        ("[[step]]\nup = [0.0, 0.0, 1.0]\ndwell_s = -1.0\n", "dwell_s"),
         ("[[step]]\nup = [0.0, 0.0, 1.0]\ndwel = 1.0\n", "line 6"),
-        (
-            "rounds = 0\n[[step]]\nup = [0.0, 0.0, 1.0]\ndwell_s = 1.0\n",
-            "rounds is 0",
-        ),
-        (
-            "[[step]]\nstay = true\ndwell_s = 1.0\n",
-            "no pose to begin in",
-        ),
-        (
-            "[[step]]\nup = [0.0, 0.0, 1.0]\nturn_axis = \"inner\"\nturn_deg = 0.0\nturn_dps = 5.0\n",
-            "an angle and a rate",
-        ),
-        (
-            "[[step]]\nup = [0.0, 0.0, 1.0]\nturn_deg = 10.0\ndwell_s = 5.0\n",
-            "without turn_axis",
-        ),
-    ] {
+        ("rounds = 0\n[[step]]\nup = [0.0, 0.0, 1.0]\ndwell_s = 1.0\n", "rounds is 0"),
+        ("[[step]]\nstay = true\ndwell_s = 1.0\n", "no pose to begin in"),
+        ("[[step]]\nup = [0.0, 0.0, 1.0]\nturn_axis = \"inner\"\nturn_deg = 0.0\nturn_dps = 5.0\n", "an angle and a rate"),
+        ("[[step]]\nup = [0.0, 0.0, 1.0]\nturn_deg = 10.0\ndwell_s = 5.0\n", "without turn_axis"),
+    ];
+    for (steps, words) in cases {
         let line = dwells(steps, "table").unwrap_err().to_string();
         assert!(line.contains(words), "{line}");
     }

@@ -142,54 +142,26 @@ fn what_cannot_be_applied_is_refused_and_a_bad_node_is_named_by_its_number() {
     let singular = table("gyro", &[[0.0; 12]; 2]) + &table("accel", &triad(1.0));
     let singular = format!("{}[[temperature.node]]\ntemp_c = 0.0\n{singular}", nodes[0]);
     let range = "range_c = [0.0, 50.0]";
-    for (text, words) in [
-        (
-            text_with(range, &swapped),
-            &["node 3", "temp_c is 4", "31"][..],
-        ),
+    #[rustfmt::skip]
+    let cases = [
+        (text_with(range, &swapped), &["node 3", "temp_c is 4", "31"][..]),
         (text_with(range, &half), &["node 2", "no [accel]"]),
         (text_with(range, &many), &["17 nodes", "1 to 16"]),
         (text_with(range, ""), &["0 nodes"]),
-        (
-            text_with(range, &singular),
-            &["node 2", "[gyro]", "a column of C"],
-        ),
+        (text_with(range, &singular), &["node 2", "[gyro]", "a column of C"]),
         (text_with("range_c = [50.0, 0.0]", &nodes[0]), &["range_c"]),
-        (
-            text_with("range_c = [70.0, 90.0]", &nodes.concat()),
-            &["70", "from -10 to 60"],
-        ),
+        (text_with("range_c = [70.0, 90.0]", &nodes.concat()), &["70", "from -10 to 60"]),
         (text_with("range_c = [0.0, nan]", &nodes[0]), &["range_c"]),
-        (
-            good.replace("lag_s = 61.2", "lag_s = 700.0"),
-            &["lag_s is 700", "-120 to 600"],
-        ),
-        (
-            good.replace("[55.0, 67.0]", "[67.0, 55.0]"),
-            &["interval_lag_s"],
-        ),
-        (
-            good.replace("lag_s = 61.2, ", ""),
-            &["it has interval_lag_s"],
-        ),
+        (good.replace("lag_s = 61.2", "lag_s = 700.0"), &["lag_s is 700", "-120 to 600"]),
+        (good.replace("[55.0, 67.0]", "[67.0, 55.0]"), &["interval_lag_s"]),
+        (good.replace("lag_s = 61.2, ", ""), &["it has interval_lag_s"]),
         (good.replace("temp_c = 31.0", "temp_c = nan"), &["node 3"]),
-        (
-            good.replace("slope_o = [", "slope_o = [inf, "),
-            &["node 1", "not a number"],
-        ),
-        (
-            good.replace("calibration/2", "calibration/1"),
-            &["[temperature]", "format"],
-        ),
-        (
-            PLAIN.replace("calibration/1", "calibration/2"),
-            &["no [temperature]"],
-        ),
-        (
-            PLAIN.replace("calibration/1", "calibration/3"),
-            &["mimu-calibration/2", "version of mimu"],
-        ),
-    ] {
+        (good.replace("slope_o = [", "slope_o = [inf, "), &["node 1", "not a number"]),
+        (good.replace("calibration/2", "calibration/1"), &["[temperature]", "format"]),
+        (PLAIN.replace("calibration/1", "calibration/2"), &["no [temperature]"]),
+        (PLAIN.replace("calibration/1", "calibration/3"), &["mimu-calibration/2", "version of mimu"]),
+    ];
+    for (text, words) in cases {
         let refused = parse(&text).expect_err(words[0]);
         for word in words {
             assert!(refused.contains(word), "{word}: {refused}");

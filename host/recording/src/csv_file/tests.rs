@@ -6,6 +6,7 @@ use proptest::prelude::*;
 
 use super::super::{Batch, ReadSummary, Recording};
 use crate::error::Result;
+use crate::tests::says;
 
 const MANIFEST: &str = "format = \"mimu-recording/1\"\ndevice = \"d\"\nsample_rate_hz = 10\n\
     gravity_mps2 = 9.8\nraw_unit = \"V\"\nreference = \"table\"\n";
@@ -177,10 +178,7 @@ fn a_row_of_the_wrong_width_is_told_with_its_row() {
 fn a_truncated_last_row_is_called_truncated() {
     for end in ["3.5,0,0,1", "3.5,0,0,-", "3", "3.5,0,0,1,2,3"] {
         let text = refused(&format!("{}{end}", table(3)));
-        assert!(
-            text.contains("row 5") && text.contains("truncated"),
-            "{text}"
-        );
+        says(&text, &["row 5", "truncated"]);
     }
 }
 

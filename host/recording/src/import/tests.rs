@@ -7,6 +7,7 @@ use proptest::prelude::*;
 use super::super::{Batch, Manifest, RawUnit, Recording, Reference};
 use super::*;
 use crate::error::Argument;
+use crate::tests::says;
 
 mod broken;
 mod clocks;
@@ -36,6 +37,11 @@ fn log<T: std::fmt::Display>(rows: usize, readings: impl Fn(usize) -> [T; 6]) ->
 
 fn warned(summary: &ImportSummary, words: &str) -> bool {
     summary.warnings.iter().any(|w| w.contains(words))
+}
+
+#[track_caller]
+fn warns(summary: &ImportSummary, words: &str) {
+    assert!(warned(summary, words), "{summary:?}");
 }
 
 /// A folder with foreign files, and the recording made from them.
@@ -377,10 +383,7 @@ fn labelled_steps_get_numbers_and_the_known_inputs_of_their_steps() {
     assert!(batch.reference[1].is_empty());
     assert_eq!(manifest.sources.len(), 2);
     let warnings = summary.warnings.join("\n");
-    assert!(
-        warnings.contains("y_a") && warnings.contains("ghost"),
-        "{warnings}"
-    );
+    says(&warnings, &["y_a", "ghost"]);
 }
 
 #[test]

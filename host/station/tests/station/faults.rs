@@ -61,35 +61,16 @@ fn each_fault_fails_by_its_own_quantity() {
                 .for_each(|v| *v = of(*v as i64) as f64);
         })
     };
+    #[rustfmt::skip]
     let cases = [
-        (
-            "scale factor",
-            wrong_scale.samples(7),
-            vec!["gravity_error"],
-        ),
+        ("scale factor", wrong_scale.samples(7), vec!["gravity_error"]),
         ("offset", offset.samples(7), vec!["gyro_y_offset"]),
-        (
-            "noise",
-            noisy.samples(7),
-            vec![
-                "gyro_x_noise_density",
-                "gyro_y_noise_density",
-                "gyro_z_noise_density",
-            ],
-        ),
+        ("noise", noisy.samples(7), vec!["gyro_x_noise_density", "gyro_y_noise_density", "gyro_z_noise_density"]),
         ("rate", slow.samples(7), vec!["sample_rate"]),
         ("losses", lossy.samples(7), vec!["lost_samples"]),
         ("upside down", upside_down.samples(7), vec!["tilt"]),
-        (
-            "lowest bit set",
-            map(1, |v| v | 1),
-            vec!["gyro_y_stuck_bits"],
-        ),
-        (
-            "third bit clear",
-            map(5, |v| v & !4),
-            vec!["accel_z_stuck_bits"],
-        ),
+        ("lowest bit set", map(1, |v| v | 1), vec!["gyro_y_stuck_bits"]),
+        ("third bit clear", map(5, |v| v & !4), vec!["accel_z_stuck_bits"]),
     ];
     for (name, samples, expected) in cases {
         let document = judged(&samples, LIMITS);

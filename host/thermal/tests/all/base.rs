@@ -9,6 +9,7 @@ use mimu_thermal::fit::{ThermalFit, fit};
 use nalgebra::Vector3;
 
 use crate::at_rest::{JOINT, at_rest, in_poses};
+use crate::says;
 use crate::session;
 use crate::simulation::{Experiment, GRAVITY, truth};
 
@@ -61,7 +62,6 @@ fn a_rest_ramp_gives_a_calibration_over_temperature_that_is_as_good_as_its_inter
     for sensor in Sensor::BOTH {
         let (with, without) = (errors(&curves, sensor), errors(&base, sensor));
         let [with_rms, without_rms] = [rms(&with), rms(&without)];
-        println!("{sensor}: {without_rms} without the curves, {with_rms} with");
         assert!(
             with_rms < 0.1 * without_rms,
             "{sensor}: {with_rms}, {without_rms}"
@@ -113,17 +113,11 @@ fn a_base_that_the_curves_cannot_be_added_to_is_refused() {
             .to_string()
     };
     let cold = refused(&at_one_temperature(-30.0));
-    assert!(
-        cold.contains("it is valid at -30.0 °C, but the dies were at"),
-        "{cold}"
-    );
+    says(&cold, &["it is valid at -30.0 °C, but the dies were at"]);
     let mut other = base.clone();
     other.device = "another".into();
     let other = refused(&other);
-    assert!(
-        other.contains("the calibration belongs to \"another\""),
-        "{other}"
-    );
+    says(&other, &["the calibration belongs to \"another\""]);
     let mut unknown = base.clone();
     unknown.recording.temp_c = None;
     let unknown = refused(&unknown);

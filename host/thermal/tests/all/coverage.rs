@@ -9,6 +9,7 @@ use mimu_thermal::session::Session;
 use mimu_thermal::warning::Warning;
 
 use crate::at_rest::JOINT;
+use crate::says;
 use crate::simulation::Random;
 
 const RATE_HZ: f64 = 50.0;
@@ -188,10 +189,7 @@ fn a_recording_that_is_mostly_shaken_is_refused_unless_it_is_declared_to_be_at_r
         ..Desk::STILL
     };
     let error = desk.fitted(4, Steps::AsRecorded).unwrap_err().to_string();
-    assert!(
-        error.contains("% of the samples") && error.contains("declare"),
-        "{error}"
-    );
+    says(&error, &["% of the samples", "declare"]);
     let result = ThermalResult::of(&desk.fitted(4, Steps::AtRest).unwrap());
     let used = result.sensors.accel.as_ref().unwrap().used.unwrap();
     assert!(used.samples > 0.99, "{used:?}");

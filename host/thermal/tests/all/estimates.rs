@@ -87,22 +87,6 @@ fn curves_and_lag_of_a_whole_cycle_are_those_of_the_unit_as_nearly_as_they_say()
 }
 
 #[test]
-fn without_a_lag_the_biases_are_wrong_by_what_the_die_lags() {
-    let experiment = Experiment::ramp(60.0, true);
-    let sessions = [session(experiment.record(4)).unwrap()];
-    let without = Choice {
-        lag_s: Some(0.0),
-        ..Choice::JOINT
-    };
-    let worst = |choice| {
-        let joint = estimate(&sessions, choice).unwrap();
-        let each = TEMPS.iter().map(|t| errors(&joint, 1, *t)[9].0.abs());
-        each.fold(0.0, f64::max)
-    };
-    assert!(worst(without) > 2.0 * worst(Choice::JOINT));
-}
-
-#[test]
 fn a_further_session_has_its_own_biases_and_the_same_curves() {
     let first = Experiment::ramp(60.0, true);
     let second = Experiment {

@@ -167,30 +167,6 @@ fn a_sweep_at_another_rate_judges_and_shows_the_bias_of_its_session() {
 }
 
 #[test]
-fn the_ramp_of_niu_and_independent_nodes_are_worse_than_the_joint_estimate() {
-    let experiment = Experiment::ramp(60.0, true);
-    let bias_error = |estimator| {
-        let options = Options { estimator, ..JOINT };
-        let found = fitted(&experiment, 16, options);
-        let curves = found.joint.curves.accel.as_ref().unwrap();
-        let squares = (0..15).map(|k| {
-            let t = -4.0 + 5.0 * f64::from(k);
-            let [model, _] = curves.forward(t);
-            ((model.bias - truth(1, t).1) / GAIN[1]).norm_squared()
-        });
-        (squares.sum::<f64>() / 15.0).sqrt()
-    };
-    let joint = bias_error(Estimator::Joint);
-    for classic in [Classic::RampNiu, Classic::Nodes] {
-        let other = bias_error(Estimator::Classic(classic));
-        assert!(
-            other > joint && other < 20.0 * joint,
-            "{classic:?}: {other} {joint}"
-        );
-    }
-}
-
-#[test]
 fn a_soak_finds_all_parameters_and_as_printed_only_scale_factors_and_biases() {
     // Plateaus of half an hour, ten kelvins apart.
     let corners = (0..9).flat_map(|k| {

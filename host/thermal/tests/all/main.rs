@@ -22,3 +22,11 @@ use mimu_thermal::session::Session;
 fn session((manifest, samples): (Manifest, Samples)) -> Result<Session, mimu::Error> {
     Session::of(&Prepared::of(manifest, &samples, STILL_FACTOR)?)
 }
+
+/// Checks that `text` contains all these words.
+#[track_caller]
+pub fn says(text: &str, words: &[&str]) {
+    for word in words {
+        assert!(text.contains(word), "{word:?} is not in: {text}");
+    }
+}

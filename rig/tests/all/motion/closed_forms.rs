@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use mimu_rig::chain::{Frame, Jet};
 use mimu_rig::place::Place;
-use mimu_rig::rotation::{Rotation, norm, scale};
+use mimu_rig::rotation::{Rotation, norm};
 
 use super::assert_near;
 
@@ -27,22 +27,6 @@ fn cone(a: f64, frequency: f64, t: f64) -> Frame {
         .about_own::<2>(turn(1.0))
         .about_own::<0>(Jet::constant(a))
         .about_own::<2>(turn(-1.0))
-}
-
-#[test]
-fn coning_has_a_steady_axial_rate_beside_the_one_that_goes_round() {
-    // w = (-W sin a sin Wt, W sin a cos Wt, -W (1 - cos a)): the tilt is about the body direction (cos Wt, sin Wt, 0), and the transverse rate is
-    // perpendicular to it.
-    let (a, frequency) = (0.01_f64, TAU * 50.0);
-    for t in [0.0, 0.0013, 0.0171] {
-        let body = cone(a, frequency, t);
-        let (s, c) = (frequency * t).sin_cos();
-        let across = frequency * a.sin();
-        let expected = [-across * s, across * c, -frequency * (1.0 - a.cos())];
-        assert_near(body.rate, expected, 1e-10);
-        let expected = scale(-frequency * across, [c, s, 0.0]);
-        assert_near(body.angular_acceleration, expected, 1e-8);
-    }
 }
 
 #[test]

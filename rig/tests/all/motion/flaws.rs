@@ -53,42 +53,16 @@ fn worst(truth: &TableTruth) -> [f64; 2] {
 #[test]
 fn what_the_table_states_is_wrong_in_proportion_to_each_flaw() {
     type Flaw = fn(f64) -> TableTruth;
+    #[rustfmt::skip]
     let flaws: [(&str, Flaw); 8] = [
-        ("wobble", |s| TableTruth {
-            wobble_arcsec: [20.0 * s, 30.0 * s, 10.0 * s],
-            ..TableTruth::ideal()
-        }),
-        ("nonorthogonality", |s| TableTruth {
-            nonorthogonality_arcsec: [20.0 * s, -30.0 * s],
-            ..TableTruth::ideal()
-        }),
-        ("level", |s| TableTruth {
-            level_arcsec: [20.0 * s, 30.0 * s],
-            ..TableTruth::ideal()
-        }),
-        ("mounting", |s| TableTruth {
-            mounting_arcsec: [20.0 * s, 30.0 * s, -50.0 * s],
-            ..TableTruth::ideal()
-        }),
-        ("rate", |s| TableTruth {
-            rate_scale_ppm: [20.0 * s, 0.0, -50.0 * s],
-            ..TableTruth::ideal()
-        }),
-        ("encoder", |s| TableTruth {
-            encoder_arcsec: [20.0 * s, 30.0 * s, -50.0 * s],
-            ..TableTruth::ideal()
-        }),
-        ("settling", |s| TableTruth {
-            settling: Settling {
-                fraction: 0.05 * s,
-                ..Default::default()
-            },
-            ..TableTruth::ideal()
-        }),
-        ("offset", |s| TableTruth {
-            offset_mm: [s, 2.0 * s, -3.0 * s],
-            ..TableTruth::ideal()
-        }),
+        ("wobble", |s| TableTruth { wobble_arcsec: [20.0 * s, 30.0 * s, 10.0 * s], ..TableTruth::ideal() }),
+        ("nonorthogonality", |s| TableTruth { nonorthogonality_arcsec: [20.0 * s, -30.0 * s], ..TableTruth::ideal() }),
+        ("level", |s| TableTruth { level_arcsec: [20.0 * s, 30.0 * s], ..TableTruth::ideal() }),
+        ("mounting", |s| TableTruth { mounting_arcsec: [20.0 * s, 30.0 * s, -50.0 * s], ..TableTruth::ideal() }),
+        ("rate", |s| TableTruth { rate_scale_ppm: [20.0 * s, 0.0, -50.0 * s], ..TableTruth::ideal() }),
+        ("encoder", |s| TableTruth { encoder_arcsec: [20.0 * s, 30.0 * s, -50.0 * s], ..TableTruth::ideal() }),
+        ("settling", |s| TableTruth { settling: Settling { fraction: 0.05 * s, ..Default::default() }, ..TableTruth::ideal() }),
+        ("offset", |s| TableTruth { offset_mm: [s, 2.0 * s, -3.0 * s], ..TableTruth::ideal() }),
     ];
     for (name, flaw) in flaws {
         let (one, two) = (worst(&flaw(1.0)), worst(&flaw(2.0)));

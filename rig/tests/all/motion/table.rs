@@ -1,6 +1,6 @@
 //! Turntables without flaws.
 
-use std::f64::consts::{FRAC_PI_2, TAU};
+use std::f64::consts::TAU;
 
 use mimu_rig::located::Source;
 use mimu_rig::motion::{Carrier, Instant};
@@ -62,53 +62,6 @@ fn the_earth_turns_a_resting_board_by_its_rate_north_and_up() {
 }
 
 #[test]
-fn a_centrifuge_pulls_the_board_to_its_axis_with_the_rate_squared_times_the_radius() {
-    let truth = TableTruth {
-        offset_mm: [100.0, 0.0, 0.0],
-        ..TableTruth::ideal()
-    };
-    let mut table = table(
-        "[[step]]\nup = [0, 0, 1]\nspin_dps = 360\ndwell_s = 2",
-        &truth,
-    );
-    let motion = first_dwell(&mut table).motion;
-    // The Earth's vertical rate adds to the table's. A body that moves east is lighter by 2 W cos(latitude) v (Eötvös effect).
-    let latitude = 30.5_f64.to_radians();
-    let rate = TAU + EARTH_RATE * latitude.sin();
-    let east = TAU * 0.1 * motion.attitude.turn([0.0, 1.0, 0.0])[0];
-    let expected = [
-        -rate * rate * 0.1,
-        0.0,
-        9.793 - 2.0 * EARTH_RATE * latitude.cos() * east,
-    ];
-    // What remains is the Earth's own centrifugal acceleration along the lever, 5e-10 m/s².
-    assert_near(motion.force, expected, EARTH_RATE * EARTH_RATE * 0.1);
-}
-
-#[test]
-fn speeding_up_pushes_across_the_radius_with_the_angular_acceleration() {
-    let truth = TableTruth {
-        offset_mm: [0.0, 50.0, 0.0],
-        max_acceleration_dps2: [90.0; 3],
-        ..TableTruth::ideal()
-    };
-    let mut table = table(
-        "lead_in_s = 1\n[[step]]\nup = [0, 0, 1]\nspin_dps = 180\ndwell_s = 2",
-        &truth,
-    );
-    // Two seconds of acceleration from 1 s on.
-    let motion = table.at(1.5).motion;
-    let (acceleration, rate) = (FRAC_PI_2, FRAC_PI_2 * 0.5);
-    assert_near(motion.angular_acceleration, [0.0, 0.0, acceleration], 1e-4);
-    assert_near(
-        motion.force,
-        [-acceleration * 0.05, -rate * rate * 0.05, 9.793],
-        1e-5,
-    );
-    assert_eq!(table.at(3.5).motion.angular_acceleration[2], 0.0);
-}
-
-#[test]
 fn a_table_without_flaws_states_what_is_true() {
     let steps = "[[step]]\nup = [0.3, -0.5, 0.4]\nheading_deg = 40\ndwell_s = 3\n\
                  [[step]]\nup = [0, 1, 0]\nrate_dps = 120\nspin_dps = -50\ndwell_s = 3\n\
@@ -148,25 +101,6 @@ fn a_pose_has_up_where_the_plan_wants_it() {
         let instant = table.at(end - 0.5);
         assert_eq!(instant.step, Some(1));
         assert_near(instant.motion.force, scale(9.793 / norm(up), up), 1e-12);
-    }
-}
-
-#[test]
-fn the_attitude_of_a_pose_does_not_depend_on_the_way_there() {
-    let last = "[[step]]\nup = [0.3, 0.4, -0.2]\nheading_deg = 30\ndwell_s = 1";
-    let attitude = |before: &str| {
-        let mut table = table(&format!("{before}{last}"), &TableTruth::ideal());
-        let end = table.duration_s();
-        table.at(end - 0.5).motion.attitude
-    };
-    let alone = attitude("");
-    for before in [
-        "[[step]]\nup = [-0.3, -0.4, 0.1]\nheading_deg = -170\ndwell_s = 1\n",
-        "[[step]]\nup = [0, 0, -1]\nrate_dps = 77\ndwell_s = 9.3\n",
-        "[[step]]\nup = [1, 0, 0]\nspin_dps = -300\ndwell_s = 5\n",
-    ] {
-        let angle = (alone.inverse() * attitude(before)).axis_angle().1;
-        assert!(angle < 1e-12, "{angle}");
     }
 }
 

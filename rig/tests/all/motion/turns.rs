@@ -197,28 +197,14 @@ fn a_turn_that_the_table_cannot_make_is_refused_with_its_line() {
         middle_max_deg: 95.0,
         ..TableTruth::ideal()
     };
-    for (text, truth, complaint) in [
-        (
-            quarter("outer", 90.0),
-            &two,
-            "PLAN.toml:9: a turn about the outer axis, but the table has none",
-        ),
-        (
-            quarter("middle", 100.0),
-            &two,
-            "PLAN.toml:9: the turn ends with the middle axis at 100.0 degrees, but its range is -180.0 to 95.0",
-        ),
-        (
-            quarter("inner", 90.0).replace("turn_dps = 10", "turn_dps = 500"),
-            &two,
-            "PLAN.toml:9: `turn_dps` is more than the inner axis's 400",
-        ),
-        (
-            format!("rounds = 2\nround_s = 5\n{}", quarter("inner", 90.0)),
-            &two,
-            "PLAN.toml:7: round 1 is due at 5 s, but the one before ends at",
-        ),
-    ] {
+    #[rustfmt::skip]
+    let cases = [
+        (quarter("outer", 90.0), &two, "PLAN.toml:9: a turn about the outer axis, but the table has none"),
+        (quarter("middle", 100.0), &two, "PLAN.toml:9: the turn ends with the middle axis at 100.0 degrees, but its range is -180.0 to 95.0"),
+        (quarter("inner", 90.0).replace("turn_dps = 10", "turn_dps = 500"), &two, "PLAN.toml:9: `turn_dps` is more than the inner axis's 400"),
+        (format!("rounds = 2\nround_s = 5\n{}", quarter("inner", 90.0)), &two, "PLAN.toml:7: round 1 is due at 5 s, but the one before ends at"),
+    ];
+    for (text, truth, complaint) in cases {
         let found = Table::new(&plan(&text), truth).unwrap_err();
         assert!(found.starts_with(complaint), "{found}");
     }

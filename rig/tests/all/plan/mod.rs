@@ -95,47 +95,16 @@ fn what_the_table_cannot_do_is_refused_with_its_limit_and_the_line_of_the_plan()
         middle_min_deg: -95.0,
         ..TableTruth::default()
     };
+    #[rustfmt::skip]
     let cases: [(&TableTruth, &str, &str); 8] = [
-        (
-            &three,
-            "up = [0, 0, -1]\ndwell_s = 1",
-            "PLAN.toml:5: `up` needs the middle axis at 180.0 degrees, but its range is -100.0 to 100.0",
-        ),
-        (
-            &three,
-            "up = [0, 0, 1]\nrate_dps = 400.1\ndwell_s = 1",
-            "PLAN.toml:6: `rate_dps`: 400.1 is more than the table's 400; slow down",
-        ),
-        (
-            &three,
-            "up = [0, 0, 1]\nspin_dps = -1e4\ndwell_s = 1",
-            "PLAN.toml:6: `spin_dps`: 10000 is more than the table's 400",
-        ),
-        (
-            &two,
-            "up = [0, 1, -0.5]\ndwell_s = 1",
-            "PLAN.toml:5: `up` needs the middle axis at 116.6 degrees",
-        ),
-        (
-            &two,
-            "up = [0, 1, 0]\ndwell_s = 1\nrate_dps = 10",
-            "PLAN.toml:7: `rate_dps` is about the vertical, but the table has no vertical axis",
-        ),
-        (
-            &two,
-            "up = [0, 1, 0]\ndwell_s = 1\nheading_deg = 10",
-            "PLAN.toml:7: `heading_deg` needs an outer axis",
-        ),
-        (
-            &two,
-            "poses = 9\ndwell_s = 1\nrate_dps = 10",
-            "PLAN.toml:7: `rate_dps` is about the vertical",
-        ),
-        (
-            &two,
-            "up = [0, 0, 1]\nrate_dps = 300\nspin_dps = 101\ndwell_s = 1",
-            "PLAN.toml:7: `spin_dps`: 401 is more",
-        ),
+        (&three, "up = [0, 0, -1]\ndwell_s = 1", "PLAN.toml:5: `up` needs the middle axis at 180.0 degrees, but its range is -100.0 to 100.0"),
+        (&three, "up = [0, 0, 1]\nrate_dps = 400.1\ndwell_s = 1", "PLAN.toml:6: `rate_dps`: 400.1 is more than the table's 400; slow down"),
+        (&three, "up = [0, 0, 1]\nspin_dps = -1e4\ndwell_s = 1", "PLAN.toml:6: `spin_dps`: 10000 is more than the table's 400"),
+        (&two, "up = [0, 1, -0.5]\ndwell_s = 1", "PLAN.toml:5: `up` needs the middle axis at 116.6 degrees"),
+        (&two, "up = [0, 1, 0]\ndwell_s = 1\nrate_dps = 10", "PLAN.toml:7: `rate_dps` is about the vertical, but the table has no vertical axis"),
+        (&two, "up = [0, 1, 0]\ndwell_s = 1\nheading_deg = 10", "PLAN.toml:7: `heading_deg` needs an outer axis"),
+        (&two, "poses = 9\ndwell_s = 1\nrate_dps = 10", "PLAN.toml:7: `rate_dps` is about the vertical"),
+        (&two, "up = [0, 0, 1]\nrate_dps = 300\nspin_dps = 101\ndwell_s = 1", "PLAN.toml:7: `spin_dps`: 401 is more"),
     ];
     for (truth, step, beginning) in cases {
         let error =

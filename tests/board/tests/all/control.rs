@@ -167,6 +167,7 @@ fn commands_are_answered_while_the_bench_stands_still_because_nobody_reads_the_p
 }
 
 #[test]
+#[ignore = "nightly: by day rig's own tests of commands"]
 fn a_table_goes_where_it_is_told_and_turns_as_fast_as_it_is_told() {
     let served = Served::new(commanded("table"), Pace::Fast, None).unwrap();
     serve(served, |client| {

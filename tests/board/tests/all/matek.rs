@@ -250,6 +250,7 @@ fn after_the_supply_comes_back_the_sensor_is_set_up_again() {
 }
 
 #[test]
+#[ignore = "nightly: by day the supply comes back, after which the sensor is set up again"]
 fn after_a_reset_the_readings_are_again_those_of_the_present() {
     let mut device = streaming(feed(), 1.0);
     // At other phases of the polls and of the bench's grid.
@@ -297,6 +298,7 @@ fn calibration(effects: &[DeviceEffect<f32>], settings: Option<PerSensor<Setting
 }
 
 #[test]
+#[ignore = "nightly: by day `mimu device check` compares the same stream"]
 fn the_compensated_stream_is_that_of_the_counts_and_of_the_crystal_s_rate() {
     // The size effect takes the angular acceleration, a difference times the sample rate.
     let size = DeviceEffect::named("accel_size_effect", &[0.01; 9], None).unwrap();
@@ -357,15 +359,4 @@ fn the_compensated_stream_is_that_of_the_counts_and_of_the_crystal_s_rate() {
         assert!(compared > 1_500, "{compared}");
         println!("crystal {crystal}: {compared} samples equal to the last bit");
     }
-}
-
-#[test]
-fn a_calibration_of_other_settings_is_refused_and_the_old_one_stays() {
-    let mut device = streaming(feed(), 1.0);
-    let other = Setting { range: 78.5, id: 1 };
-    device.upload(&calibration(&[], Some(PerSensor::both(other))));
-    let sensor = Sensor::Gyro;
-    let refusal = Refusal::NotUsable(StoredError::Setting { sensor });
-    assert_eq!(device.ask(Request::UploadCommit), Answer::Refused(refusal));
-    assert_eq!(device.download(), None);
 }

@@ -230,6 +230,7 @@ fn a_stack_that_overflows_is_a_fault_of_its_own_and_clobbers_nothing() {
 
 /// A transmitter whose interrupt never comes: samples go on and feed the watchdog.
 #[test]
+#[ignore = "nightly: another place that waits; by day the watchdog bites a task and an interrupt"]
 fn a_transmitter_that_waits_for_ever_restarts_the_device() {
     let mut board = sampling();
     board.send(&call(Request::Stream {
@@ -247,6 +248,7 @@ fn a_transmitter_that_waits_for_ever_restarts_the_device() {
 
 /// A request in whose middle the task is never woken again: samples and frames go on.
 #[test]
+#[ignore = "nightly: another place that waits; by day the watchdog bites a task and an interrupt"]
 fn a_command_that_waits_for_ever_restarts_the_device() {
     let mut board = sampling();
     board.send(&call(Request::SelfTest));
@@ -305,6 +307,7 @@ fn bites(board: &mut Board) -> usize {
 
 /// Sampling is started again and again, and never succeeds.
 #[test]
+#[ignore = "nightly: another place that waits; by day the watchdog bites a task and an interrupt"]
 fn a_converter_that_gives_no_sample_is_bitten_by_the_watchdog() {
     let mut board = sampling();
     board.stop_converter().unwrap();
@@ -315,6 +318,7 @@ fn a_converter_that_gives_no_sample_is_bitten_by_the_watchdog() {
 
 /// The emulated oscillator always starts, so the program is stopped where it sets the clocks.
 #[test]
+#[ignore = "nightly: another place that waits; by day the watchdog bites a task and an interrupt"]
 fn a_program_that_waits_for_the_clocks_for_ever_is_bitten_by_the_watchdog() {
     let mut board = still(Volts::GROUND);
     let clocks = image().find("rcc8__version4init").unwrap();
@@ -332,6 +336,7 @@ fn a_program_that_waits_for_the_clocks_for_ever_is_bitten_by_the_watchdog() {
 
 /// As if the log itself caused the failure, or the program stopped during a log.
 #[test]
+#[ignore = "nightly: a second fault within the panic"]
 fn a_panic_is_told_also_if_the_log_of_it_faults() {
     let mut board = sampling();
     let log = image().find("acquire_and_header").unwrap();

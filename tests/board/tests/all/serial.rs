@@ -157,6 +157,7 @@ pub fn at_rest(rail: f64) -> Volts {
 }
 
 #[test]
+#[ignore = "nightly: by day the firmware's own tests of each row"]
 fn the_self_test_tells_a_supply_a_reference_and_a_temperature_by_name() {
     let input = |net| {
         let wire = WIRING.iter().find(|(of, ..)| *of == net);

@@ -19,25 +19,10 @@ use generator::*;
 
 #[test]
 fn what_only_its_owner_can_judge_is_a_warning() {
+    #[rustfmt::skip]
     let cases: &[Case] = &[
-        (
-            "two axes of the gyro swapped",
-            by_hand,
-            |s| swap(s, "gyro_x", "gyro_y"),
-            &["gyro: the axes are left-handed"],
-        ),
-        (
-            "the same on the table",
-            on_table,
-            |s| swap(s, "gyro_x", "gyro_y"),
-            &["gyro: the axes are left-handed"],
-        ),
-        (
-            "two axes of the accelerometer swapped",
-            by_hand,
-            |s| swap(s, "accel_x", "accel_y"),
-            &["gyro: its axes are rotated by 180 degrees"],
-        ),
+        ("two axes of the gyro swapped", by_hand, |s| swap(s, "gyro_x", "gyro_y"), &["gyro: the axes are left-handed"]),
+        ("two axes of the accelerometer swapped", by_hand, |s| swap(s, "accel_x", "accel_y"), &["gyro: its axes are rotated by 180 degrees"]),
         (
             "all axes of the gyro in another order",
             on_table,
@@ -57,12 +42,7 @@ fn what_only_its_owner_can_judge_is_a_warning() {
             },
             &["gyro: raw_unit = \"SI\"", "they are in deg/s"],
         ),
-        (
-            "counts for SI",
-            by_hand,
-            |s| s.set("raw_unit", "\"SI\""),
-            &["accel: raw_unit = \"SI\"", "1632 times"],
-        ),
+        ("counts for SI", by_hand, |s| s.set("raw_unit", "\"SI\""), &["accel: raw_unit = \"SI\"", "1632 times"]),
         (
             "the first rows at the full scale of a gyro in SI",
             by_hand,
@@ -77,12 +57,7 @@ fn what_only_its_owner_can_judge_is_a_warning() {
             },
             &["gyro_y: 1 sample at 4.363325", "full scale"],
         ),
-        (
-            "nothing but poses on the table",
-            || on_table_at(&[0.0], &[0, 1, 2]),
-            |_| {},
-            &["gyro: not calibrated: all dwells have the same input"],
-        ),
+        ("nothing but poses on the table", || on_table_at(&[0.0], &[0, 1, 2]), |_| {}, &["gyro: not calibrated: all dwells have the same input"]),
     ];
     for (name, base, damage, words) in cases {
         println!("{name}");

@@ -6,19 +6,13 @@ use mimu_core::wire::{EFFECTS, Refusal, flags};
 use super::calibration::{EFFECTS as ALL_EFFECTS, forward};
 use super::peer::{Peer, Script};
 use super::{Place, mimu};
+use crate::command::says;
 
 /// The bytes that a device receives for this calibration file.
 fn uploaded(place: &Place, calibration: &str) -> Vec<u8> {
     let peer = Peer::new(Script::default());
-    let arguments = [
-        "device",
-        "upload",
-        calibration,
-        "--port",
-        &peer.path,
-        "--json",
-        "-",
-    ];
+    #[rustfmt::skip]
+    let arguments = ["device", "upload", calibration, "--port", &peer.path, "--json", "-"];
     mimu(place, &arguments).json();
     let seen = peer.seen.lock().unwrap();
     seen.stored.clone().unwrap()
@@ -32,15 +26,8 @@ fn a_calibration_arrives_whole_over_a_line_that_loses_and_garbles() {
         losing: 4,
         ..Script::default()
     });
-    let upload = [
-        "device",
-        "upload",
-        &calibration,
-        "--port",
-        &peer.path,
-        "--json",
-        "-",
-    ];
+    #[rustfmt::skip]
+    let upload = ["device", "upload", &calibration, "--port", &peer.path, "--json", "-"];
     let result = mimu(&place, &upload).json();
     assert_eq!(result["was_there"], false);
     assert!(result["repeated"].as_u64().unwrap() > 0, "{result}");
@@ -90,15 +77,8 @@ fn a_device_that_restarts_in_the_middle_of_an_upload_gets_all_of_it_again() {
         restart_at_chunk: Some(256),
         ..Script::default()
     });
-    let upload = [
-        "device",
-        "upload",
-        &calibration,
-        "--port",
-        &peer.path,
-        "--json",
-        "-",
-    ];
+    #[rustfmt::skip]
+    let upload = ["device", "upload", &calibration, "--port", &peer.path, "--json", "-"];
     let result = mimu(&place, &upload).json();
     assert_eq!(result["restarts"], 1);
     assert_eq!(
@@ -243,14 +223,8 @@ fn samples_that_carry_a_flag_are_counted_and_told() {
     ];
     let text = mimu(&place, &record);
     let all = text.stdout + &text.stderr;
-    assert!(
-        all.contains("500 samples whose temperature ignores gyro y"),
-        "{all}"
-    );
-    assert!(
-        all.contains("500 samples without a known power-on"),
-        "{all}"
-    );
+    says(&all, &["500 samples whose temperature ignores gyro y"]);
+    says(&all, &["500 samples without a known power-on"]);
 }
 
 #[test]
@@ -265,18 +239,8 @@ fn a_warm_up_is_compared_by_the_time_since_power_on_that_the_device_tells() {
             speed: 4.0,
             ..Script::default()
         });
-        let arguments = [
-            "device",
-            "check",
-            "--calibration",
-            &calibration,
-            "--for",
-            "500ms",
-            "--port",
-            &peer.path,
-            "--json",
-            "-",
-        ];
+        #[rustfmt::skip]
+        let arguments = ["device", "check", "--calibration", &calibration, "--for", "500ms", "--port", &peer.path, "--json", "-"];
         let result = mimu(&place, &arguments).json();
         // The device sums its time batch by batch. The PC begins with the first batch that it receives, which on a busy machine is a later one.
         let ulps = result["gyro"]["ulps"].as_u64().unwrap();
@@ -308,14 +272,8 @@ fn the_compensated_stream_is_compared_sample_by_sample() {
             speed: 2.0,
             ..Script::default()
         });
-        let fixed = [
-            "device",
-            "check",
-            "--calibration",
-            &calibration,
-            "--for",
-            "2s",
-        ];
+        #[rustfmt::skip]
+        let fixed = ["device", "check", "--calibration", &calibration, "--for", "2s"];
         let run = mimu(
             &place,
             &[&fixed[..], &["--port", &peer.path, "--json", "-"]].concat(),
@@ -363,14 +321,8 @@ fn the_kalman_bank_is_compared_on_the_samples_that_it_took_in() {
         speed: 2.0,
         ..Script::default()
     });
-    let fixed = [
-        "device",
-        "kalman",
-        "--force-mps2",
-        "0,0,9.81",
-        "--force-mps2",
-        "0,9.81,0",
-    ];
+    #[rustfmt::skip]
+    let fixed = ["device", "kalman", "--force-mps2", "0,0,9.81", "--force-mps2", "0,9.81,0"];
     let run = mimu(
         &place,
         &[

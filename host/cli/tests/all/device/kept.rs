@@ -120,24 +120,6 @@ fn a_file_with_half_of_its_uncertainty_is_refused() {
     refused.refused(&["unit_id", "\"12\" is not a unit's number", "24 hexadecimal"]);
 }
 
-/// A calibration in an earlier layout, which no program reads any more.
-#[test]
-fn a_calibration_of_an_earlier_layout_is_refused_with_what_to_do() {
-    let place = Place::new();
-    let file = of_unit(&place, &unit());
-    let peer = Peer::new(Script::default());
-    device(&place, &peer, &["upload", &file]);
-    let mut bytes = peer.seen.lock().unwrap().stored.clone().unwrap();
-    bytes[4] = 5;
-    let peer = Peer::new(Script {
-        stored: Some(bytes),
-        ..Script::default()
-    });
-    let again = "upload the calibration file again";
-    device(&place, &peer, &["download", "--bytes", "cal.bin"]).refused(&["version 5", again]);
-    assert!(!place.path("cal.bin").exists());
-}
-
 /// The unit's calibration file with three nodes over temperature.
 fn over_temperature(place: &Place) -> String {
     let plain = of_unit(place, &unit());

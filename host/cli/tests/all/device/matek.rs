@@ -14,6 +14,7 @@ use super::super::wizard::bench::digital_image;
 use super::board::{AT_REST, Bench, GRAVITY};
 use super::calibration::{EFFECTS, Forward, text_of};
 use super::{Place, mimu};
+use crate::command::says;
 
 /// The crystal counts this many milliseconds between two samples.
 const CRYSTAL: f64 = 0.98;
@@ -136,14 +137,8 @@ fn counts_go_the_whole_way_and_a_calibration_of_another_range_is_refused() {
     std::fs::write(place.path("unit.toml"), text).unwrap();
     let sent = bench.json(&place, &["device", "upload", "unit.toml"]);
     assert_eq!(sent["was_there"], false);
-    let back = [
-        "device",
-        "download",
-        "-o",
-        "back.toml",
-        "--bytes",
-        "back.bin",
-    ];
+    #[rustfmt::skip]
+    let back = ["device", "download", "-o", "back.toml", "--bytes", "back.bin"];
     let contents = bench.json(&place, &back);
     assert_eq!(contents["raw_unit"], "count");
     let again = bench.json(&place, &["device", "upload", "back.toml"]);
@@ -175,10 +170,7 @@ fn counts_go_the_whole_way_and_a_calibration_of_another_range_is_refused() {
         "{recorded}"
     );
     let manifest = std::fs::read_to_string(place.path("rec/recording.toml")).unwrap();
-    assert!(
-        manifest.contains("raw_unit = \"count\"") && manifest.contains("ICM-42688-P"),
-        "{manifest}"
-    );
+    says(&manifest, &["raw_unit = \"count\"", "ICM-42688-P"]);
     // A crystal of 7.84 MHz is below the range of the reference that the firmware sets for one of 8.
     bench.end_but_for(&["PLLxRGE"]);
 }

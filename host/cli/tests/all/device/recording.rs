@@ -10,23 +10,7 @@ use mimu_recording::{Batch, Recording};
 use super::peer::{ACCEL_VOLTS, Act, GYRO_VOLTS, Peer, Script, TEMP_C, sums};
 use super::{Place, command, mimu, start};
 
-/// All rows, including their inputs.
-fn all_rows(place: &Place, name: &str) -> (Recording, Batch) {
-    let (recording, mut all) = rows(place, name);
-    let read = recording.for_each_batch(
-        |_| {},
-        |batch| {
-            for (all, more) in all.reference.iter_mut().zip(&batch.reference) {
-                all.extend_from_slice(more);
-            }
-            Ok(())
-        },
-    );
-    read.unwrap();
-    (recording, all)
-}
-
-/// All rows of a recording.
+/// All rows of a recording, with their inputs.
 pub fn rows(place: &Place, name: &str) -> (Recording, Batch) {
     let recording = Recording::open(&place.path(name)).unwrap();
     let mut all = Batch::default();
@@ -37,6 +21,9 @@ pub fn rows(place: &Place, name: &str) -> (Recording, Batch) {
             all.step.extend_from_slice(&batch.step);
             all.temp_c.extend_from_slice(&batch.temp_c);
             for (all, more) in all.raw.iter_mut().zip(&batch.raw) {
+                all.extend_from_slice(more);
+            }
+            for (all, more) in all.reference.iter_mut().zip(&batch.reference) {
                 all.extend_from_slice(more);
             }
             Ok(())
@@ -102,6 +89,9 @@ fn lost_and_garbled_batches_are_gaps_that_are_counted_and_never_closed() {
     assert_eq!(gaps(&rows), [(11_999.0, 12_020.0), (12_999.0, 13_040.0)]);
     assert_eq!(rows.t_s.len() as u64, result["samples"].as_u64().unwrap());
     assert_eq!(rows.t_s.len(), 20_000 - 60);
+    // A time of 5 digits, a temperature of 5, six readings of up to 9 digits and a point, and the separators.
+    let samples = std::fs::metadata(place.path("rec/samples.csv")).unwrap();
+    assert!(samples.len() < 80 * 20_000, "{} bytes", samples.len());
     assert!(recording.warnings.is_empty(), "{:?}", recording.warnings);
     let recorded = recording.manifest.recorded.unwrap();
     assert_eq!(
@@ -121,14 +111,8 @@ fn dwells_by_time_begin_and_end_with_their_sample_and_parquet_holds_the_same() {
     let fixed = [
         "record", "--port", &peer.path, "-o", "rec", "--for", "3s", "--json", "-",
     ];
-    let more = [
-        "--step-every",
-        "700ms,300ms",
-        "--format",
-        "parquet",
-        "--gravity",
-        "9.81",
-    ];
+    #[rustfmt::skip]
+    let more = ["--step-every", "700ms,300ms", "--format", "parquet", "--gravity", "9.81"];
     let result = mimu(&place, &[&fixed[..], &more].concat()).json();
     assert_eq!(result["dwells"], 3);
     assert!(place.path("rec/samples.parquet").exists());
@@ -287,15 +271,8 @@ fn a_port_that_vanishes_ends_the_recording_with_what_there_is() {
         speed: 2.0,
         ..Script::default()
     });
-    let arguments = [
-        "record",
-        "--port",
-        &peer.path,
-        "-o",
-        "rec",
-        "--reconnect",
-        "300ms",
-    ];
+    #[rustfmt::skip]
+    let arguments = ["record", "--port", &peer.path, "-o", "rec", "--reconnect", "300ms"];
     let run = mimu(&place, &arguments);
     run.refused(&[
         &peer.path,
@@ -364,6 +341,7 @@ fn a_recording_goes_on_after_the_cable_was_pulled_and_the_device_s_clock_measure
 
 /// The gap is measured by this computer's clock, over the calls that remain unanswered meanwhile.
 #[test]
+#[ignore = "nightly: fourteen seconds of waiting"]
 fn a_power_cut_behind_a_port_that_stays_is_a_gap_of_its_length() {
     let place = Place::new();
     let away_ms = 8_000;
@@ -399,15 +377,8 @@ fn a_plan_by_time_gives_every_sample_of_a_dwell_its_input() {
         speed: 4.0,
         ..Script::default()
     });
-    let record = [
-        "record",
-        "--port",
-        &peer.path,
-        "-o",
-        "rec",
-        "--plan",
-        "plan.toml",
-    ];
+    #[rustfmt::skip]
+    let record = ["record", "--port", &peer.path, "-o", "rec", "--plan", "plan.toml"];
     let nothing = mimu(&place, &record);
     nothing.refused(&["--plan", "beginnings and ends", "--transit"]);
     let by_time = [&record[..], &["--transit", "250ms", "--json", "-"]].concat();
@@ -416,7 +387,7 @@ fn a_plan_by_time_gives_every_sample_of_a_dwell_its_input() {
         (&result["dwells"], &result["samples"]),
         (&3.into(), &1750.into())
     );
-    let (recording, rows) = all_rows(&place, "rec");
+    let (recording, rows) = rows(&place, "rec");
     let manifest = &recording.manifest;
     assert_eq!(manifest.reference, mimu_recording::Reference::Table);
     assert_eq!(
@@ -456,28 +427,16 @@ fn a_table_of_inputs_is_taken_by_the_labels_of_its_rows_and_turns_at_the_end() {
         speed: 4.0,
         ..Script::default()
     });
+    #[rustfmt::skip]
     let arguments = [
-        "record",
-        "--port",
-        &peer.path,
-        "-o",
-        "rec",
-        "--inputs",
-        "inputs.csv",
-        "--step-every",
-        "500ms,100ms",
-        "--for",
-        "1100ms",
-        "--gravity",
-        "9.81",
-        "--json",
-        "-",
+        "record", "--port", &peer.path, "-o", "rec", "--inputs", "inputs.csv", "--step-every", "500ms,100ms", "--for", "1100ms", "--gravity",
+        "9.81", "--json", "-",
     ];
     let result = mimu(&place, &arguments).json();
     // Of the last one nothing was recorded, which is reported.
     let warning = result["warnings"][0].as_str().unwrap();
     assert!(warning.contains("face_down"), "{warning}");
-    let (recording, rows) = all_rows(&place, "rec");
+    let (recording, rows) = rows(&place, "rec");
     let manifest = &recording.manifest;
     assert_eq!(manifest.step_labels, ["face_up", "about_x", "face_down"]);
     assert_eq!(manifest.turn_steps, [1]);

@@ -103,6 +103,7 @@ fn means(csv: &str) -> Vec<([f64; 3], f64, bool)> {
 }
 
 #[test]
+#[ignore = "nightly: half a minute of the emulated board; by day `pipeline::temperature` follows the dies"]
 fn the_device_follows_a_chamber_through_its_nodes_and_says_where_they_end() {
     let (place, truth) = (Place::new(), drifting());
     // From 20 to 70 °C at 2 °C/s, after the calibration is stored.
@@ -130,14 +131,8 @@ fn the_device_follows_a_chamber_through_its_nodes_and_says_where_they_end() {
     let (first, last) = (seen[0].1, seen[seen.len() - 1].1);
     assert!(last - first > 25.0, "{first} to {last} °C");
 
-    let checked = [
-        "device",
-        "check",
-        "--calibration",
-        "curves.toml",
-        "--for",
-        "4s",
-    ];
+    #[rustfmt::skip]
+    let checked = ["device", "check", "--calibration", "curves.toml", "--for", "4s"];
     let checked = bench.json(&place, &checked);
     assert_eq!(checked["holds"], true, "{checked}");
     assert_eq!(
@@ -208,16 +203,8 @@ fn a_trim_takes_out_the_offsets_that_have_drifted_and_keeps_everything_else() {
         let both = sigma.hypot(figure(&gyro_alone, "gyro", "sigma_after", i));
         assert!(after.abs() < 7.0 * both, "{gyro_alone}");
     }
-    let up = [
-        "device",
-        "trim",
-        "--up",
-        "+z",
-        "--gravity",
-        &gravity,
-        "--for",
-        "6s",
-    ];
+    #[rustfmt::skip]
+    let up = ["device", "trim", "--up", "+z", "--gravity", &gravity, "--for", "6s"];
     let both = bench.json(&place, &up);
     for i in 0..3 {
         let sigma = figure(&both, "accel", "sigma_before", i);
@@ -233,16 +220,8 @@ fn a_trim_takes_out_the_offsets_that_have_drifted_and_keeps_everything_else() {
         );
     }
     // If the unit is in another pose than the given one, nothing is stored.
-    let wrong = [
-        "device",
-        "trim",
-        "--up",
-        "-z",
-        "--gravity",
-        &gravity,
-        "--for",
-        "4s",
-    ];
+    #[rustfmt::skip]
+    let wrong = ["device", "trim", "--up", "-z", "--gravity", &gravity, "--for", "4s"];
     bench
         .run(&place, &wrong)
         .refused(&["accel z is off by", "the pose that was given"]);
@@ -250,14 +229,8 @@ fn a_trim_takes_out_the_offsets_that_have_drifted_and_keeps_everything_else() {
     let fetched = bench.json(&place, &["device", "download", "-o", "new.toml"]);
     assert_eq!(fetched["hash"], both["hash"]);
     assert!(fetched["trimmed"].is_string() && fetched["created"] == "2026-01-01T00:00:00Z");
-    let check = [
-        "device",
-        "check",
-        "--calibration",
-        "new.toml",
-        "--for",
-        "1s",
-    ];
+    #[rustfmt::skip]
+    let check = ["device", "check", "--calibration", "new.toml", "--for", "1s"];
     assert_eq!(bench.json(&place, &check)["holds"], true);
     bench.end();
 }

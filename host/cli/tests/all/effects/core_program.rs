@@ -62,7 +62,6 @@ fn the_program_of_the_readme_of_core_gives_what_apply_gives() {
     })
     .unwrap();
     assert_eq!(row, si.len());
-    println!("the program of the README differs from apply by {off:?} rad/s, m/s², of {largest:?}");
     // Readings of up to 3.3 V in single precision have an error of 1.2e-7 V, up to 4e-7 rad/s and 2e-6 m/s²; nine products add as much again. `apply`
     // uses one temperature per 0.1 s; the 0.015 K here are 4e-6 rad/s of this thermal bias.
     assert!(off[0] < 1e-5 && off[1] < 1e-5, "{off:?} of {largest:?}");

@@ -1,7 +1,7 @@
 //! The calibration stored by a device, fetched back, as input of every command.
 
 use mimu::calibration::Calibration;
-use mimu_device::{Image, calibration, contents};
+use mimu_device::{Image, calibration};
 
 use super::unit::{CUBIC, SAG, fitted, named, record};
 use super::{every_effect, mimu};
@@ -25,8 +25,6 @@ fn every_effect_is_fetched_as_it_was_sent() {
     let made = Calibration::of(&fit, &every_effect(), CREATED).unwrap();
     let (sent, kept) = fetched(&made);
     let again = Image::new(&kept, "kept.toml").unwrap();
-    let shown = contents(&sent.bytes).unwrap();
-    println!("{} effects, {} bytes", shown.effects.len(), shown.bytes);
     assert!(again.bytes == sent.bytes, "to the last bit");
     let ids =
         |c: &Calibration| -> Vec<String> { c.effects().iter().map(|e| e.candidate.id()).collect() };

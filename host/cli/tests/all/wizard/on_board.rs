@@ -1,6 +1,7 @@
 //! `mimu wizard` with the firmware's release image on the emulated board, on a turntable and in hands that it commands. Killed, unplugged, garbled
 //! and disturbed sessions end with the right calibration or with a clear message, and never store a wrong one.
 use super::bench::{Bench, in_repository, unit};
+use crate::command::says;
 use mimu::calibration::Calibration;
 use mimu::quantity::Sensor;
 use mimu_rig::rig_file::RigTruth;
@@ -98,6 +99,7 @@ fn on_table(plan: &str) -> [&str; 9] {
 }
 
 #[test]
+#[ignore = "nightly: a session on the emulated board; by day `device::conversation` compares the filters"]
 fn the_devices_own_filters_make_the_calibration_and_a_dwell_with_a_lost_line_leaves_no_trace() {
     let mut bench = Bench::new("table", unit(8), 8);
     let plan = short_plan(&bench);
@@ -112,15 +114,11 @@ fn the_devices_own_filters_make_the_calibration_and_a_dwell_with_a_lost_line_lea
     let told =
         String::from_utf8_lossy(&out.stdout).into_owned() + &String::from_utf8_lossy(&out.stderr);
     assert!(out.status.success(), "{told}");
-    assert!(
-        told.contains("the calibration is the device's estimate"),
-        "{told}"
-    );
+    says(&told, &["the calibration is the device's estimate"]);
     let stored = bench.outcome()["units"][0]["stored"].clone();
     assert_eq!(stored, "session/calibration.toml", "{told}");
     let calibration = Calibration::read(&bench.path("session/calibration.toml")).unwrap();
     let [gyro, accel] = errors(&calibration, &bench.truth);
-    println!("errors: gyro {gyro:.5} rad/s, accel {accel:.5} m/s²; {told}");
     assert!(gyro < 0.2f64.to_radians() && accel < 0.02, "{gyro} {accel}");
 }
 
@@ -163,12 +161,9 @@ fn a_session_that_was_killed_and_unplugged_goes_on_to_a_stored_calibration_that_
     assert_eq!(found["stored"], "session/calibration.toml", "{told}");
 
     let calibration = Calibration::read(&bench.path("session/calibration.toml")).unwrap();
-    let [gyro, accel] = errors(&calibration, &bench.truth);
     // Dwells of one second give 0.11 deg/s and 0.5 mg. Which of them are repeated depends on the instant of the interruption, and so does the noise: the
     // intervals tell whether the stored calibration holds the truth.
-    println!("errors: gyro {gyro:.5} rad/s, accel {accel:.5} m/s²");
     let worst = half_intervals(&calibration, &bench.truth);
-    println!("worst: {worst:?} half intervals");
     assert!(worst.into_iter().all(|w| w < 2.0), "{worst:?}");
     // The recording is an ordinary one.
     let manifest =
@@ -182,6 +177,7 @@ fn a_session_that_was_killed_and_unplugged_goes_on_to_a_stored_calibration_that_
 }
 
 #[test]
+#[ignore = "nightly: a session on the emulated board; by day `device::thermal_record` ends at a wrong pose"]
 fn a_table_that_turns_the_wrong_axis_stops_the_session_and_nothing_is_stored() {
     let bench = Bench::new("table", unit(7), 7);
     let driver = std::fs::read_to_string(bench.path("driver.toml")).unwrap();
@@ -191,22 +187,12 @@ fn a_table_that_turns_the_wrong_axis_stops_the_session_and_nothing_is_stored() {
     )
     .unwrap();
     let plan = short_plan(&bench);
-    let arguments = [
-        "--fixture",
-        "table",
-        "--plan",
-        &plan,
-        "--as-planned",
-        "--patience",
-        "4",
-    ];
+    #[rustfmt::skip]
+    let arguments = ["--fixture", "table", "--plan", &plan, "--as-planned", "--patience", "4"];
     let out = bench.wizard(&arguments).output().unwrap();
     let told = String::from_utf8_lossy(&out.stderr);
     assert_eq!(out.status.code(), Some(1), "{told}");
-    assert!(
-        told.contains("are not met") && told.contains("wrong pose"),
-        "{told}"
-    );
+    says(&told, &["are not met", "wrong pose"]);
     assert!(!bench.path("session/calibration.toml").exists());
 }
 
@@ -224,9 +210,6 @@ fn a_driver_file_with_a_mistake_is_refused_with_its_line() {
         .output()
         .unwrap();
     let told = String::from_utf8_lossy(&out.stderr);
-    assert!(
-        told.contains("line 5") && told.contains("interlok"),
-        "{told}"
-    );
+    says(&told, &["line 5", "interlok"]);
     assert_eq!(out.status.code(), Some(1));
 }

@@ -6,7 +6,7 @@ use mimu::plan::design::information::Rows;
 use mimu::plan::design::refinement::{Region, refine};
 use nalgebra::DMatrix;
 
-use super::{brute_force, close};
+use super::close;
 
 /// Polynomials up to a degree on the interval or the square from -1 to 1.
 struct Cube {
@@ -175,55 +175,6 @@ fn the_quadratic_on_the_square_has_box_and_drapers_exact_designs() {
             close(found, det, 1e-9),
             "{n}: {found}, not {det}: {points:?}"
         );
-    }
-}
-
-#[test]
-fn seven_and_eight_runs_on_the_square_are_as_good_as_brute_force_finds() {
-    for n in [7, 8] {
-        let known = brute_force::best(2 * n, 1.0, |x| {
-            let points: Vec<[f64; 2]> = x.chunks(2).map(|p| [p[0], p[1]]).collect();
-            of_square(&points)
-        });
-        let (points, found) = Cube {
-            factors: 2,
-            degree: 2,
-        }
-        .best(n, 10);
-        assert!(
-            close(found, known, 1e-6),
-            "{n}: {found}, not {known}: {points:?}"
-        );
-    }
-}
-
-#[test]
-fn no_exchange_of_one_run_betters_what_a_single_start_ends_with() {
-    let square = Cube {
-        factors: 2,
-        degree: 2,
-    };
-    let grid = square.grid(6);
-    let rows = square.rows(&grid);
-    let determinant = |points: &[usize]| {
-        let each = points.iter().map(|&i| [grid[i][0], grid[i][1]]);
-        of_square(&each.collect::<Vec<_>>())
-    };
-    for seed in 0..20 {
-        let found = &exchange::search(&rows, 7, 1, seed)[0];
-        let known = determinant(&found.points);
-        assert!(close(found.log_det.exp(), known, 1e-9));
-        for k in 0..7 {
-            for other in 0..grid.len() {
-                let mut points = found.points.clone();
-                points[k] = other;
-                let exchanged = determinant(&points);
-                assert!(
-                    exchanged <= known * (1.0 + 1e-7),
-                    "{seed}: {known} {exchanged}"
-                );
-            }
-        }
     }
 }
 

@@ -8,6 +8,7 @@ use std::path::PathBuf;
 use super::super::text_table::Cells;
 use super::super::time::Stamp;
 use super::*;
+use crate::tests::says;
 
 fn fixture() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("src/import/ardupilot/fixtures/two-sensors.bin")
@@ -45,10 +46,12 @@ fn calibration_and_mounting_are_undone_by_the_parameters_of_the_time_of_each_rea
     let mut all = open(&fixture(), Some("IMU"), Some(0)).unwrap();
     assert_eq!(all.len(), 1);
     let notes = &all[0].notes[0];
-    assert!(
-        notes.contains("24 messages IMU of instance 0, ArduPilot's calibration undone")
-            && notes.contains("scale factor 1.250000 0.500000 2.000000"),
-        "{notes}"
+    says(
+        &notes,
+        &[
+            "24 messages IMU of instance 0, ArduPilot's calibration undone",
+            "scale factor 1.250000 0.500000 2.000000",
+        ],
     );
     let warned = all[0].warnings.join(" ");
     assert!(warned.contains("changes 1 times"), "{warned}");

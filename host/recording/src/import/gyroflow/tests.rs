@@ -1,6 +1,7 @@
 //! Files as the format's documentation gives them, with made-up numbers.
 
 use super::*;
+use crate::tests::says;
 
 const HEAD: &str = "GYROFLOW IMU LOG\nversion,1.3\nid,potatocam\norientation,YxZ\nnote,\nfwversion,FIRMWARE_0.1.0\n";
 const SCALES: &str = "tscale,0.0005\ngscale,0.00122173047\nascale,0.00048828125\n";
@@ -55,20 +56,14 @@ fn rows_that_are_cut_or_no_numbers_are_counted() {
     let readings = read_text(&text).unwrap();
     assert_eq!(readings.len(), 2);
     let warning = readings.warnings.join(" ");
-    assert!(
-        warning.contains("2 rows") && warning.contains("line 12"),
-        "{warning}"
-    );
+    says(&warning, &["2 rows", "line 12"]);
 }
 
 #[test]
 fn a_header_that_leaves_a_unit_open_is_refused_and_so_is_another_file() {
     let refused = |text: &str| read_text(text).unwrap_err().to_string();
     let no_scale = refused("GYROFLOW IMU LOG\ngscale,1\nt,gx,gy,gz,ax,ay,az\n0,1,2,3,4,5,6\n");
-    assert!(
-        no_scale.contains("ascale") && no_scale.contains("g per count"),
-        "{no_scale}"
-    );
+    says(&no_scale, &["ascale", "g per count"]);
     assert!(refused("GYROFLOW IMU LOG\ngscale,fast\nt,gx,gy,gz\n").contains("\"fast\""));
     assert!(refused("t,gx,gy,gz\n0,1,2,3\n").contains("GYROFLOW IMU LOG"));
     assert!(refused(HEAD).contains("t,gx,gy,gz"));

@@ -116,32 +116,14 @@ fn a_first_column_that_grows_evenly_is_the_time_under_any_name() {
 
 #[test]
 fn units_behind_the_names_of_axes_and_rates_named_after_angles_are_understood() {
-    for (names, accel, gyro, units) in [
-        (
-            "ax_g,ay_g,az_g,gx_dps,gy_dps,gz_dps",
-            1.0 / G,
-            57.29578,
-            ["g", "deg/s"],
-        ),
-        (
-            "Ax_mg,Ay_mg,Az_mg,Gx_mdps,Gy_mdps,Gz_mdps",
-            1e3 / G,
-            57_295.78,
-            ["mg", "mdeg/s"],
-        ),
-        (
-            "acc_x,acc_y,acc_z,roll_rate,pitch_rate,yaw_rate",
-            1.0,
-            1.0,
-            ["m/s²", "rad/s"],
-        ),
-        (
-            "xacc,yacc,zacc,rollspeed,pitchspeed,yawspeed",
-            1.0,
-            1.0,
-            ["m/s²", "rad/s"],
-        ),
-    ] {
+    #[rustfmt::skip]
+    let cases = [
+        ("ax_g,ay_g,az_g,gx_dps,gy_dps,gz_dps", 1.0 / G, 57.29578, ["g", "deg/s"]),
+        ("Ax_mg,Ay_mg,Az_mg,Gx_mdps,Gy_mdps,Gz_mdps", 1e3 / G, 57_295.78, ["mg", "mdeg/s"]),
+        ("acc_x,acc_y,acc_z,roll_rate,pitch_rate,yaw_rate", 1.0, 1.0, ["m/s²", "rad/s"]),
+        ("xacc,yacc,zacc,rollspeed,pitchspeed,yawspeed", 1.0, 1.0, ["m/s²", "rad/s"]),
+    ];
+    for (names, accel, gyro, units) in cases {
         let look = look(&format!("t,{names}\n"), |_, t, force, rate| {
             format!(
                 "{t},{},{}\n",
@@ -273,22 +255,10 @@ fn dumps_of_bags_and_of_data_frames_are_understood() {
 fn lines_with_labels_are_read_and_a_proposed_list_has_as_many_names_as_they_have_cells() {
     let counts = |values: [f64; 3], factor: f64| values.map(|v| (v * factor).round().to_string());
     type Write = fn(usize, f64, [f64; 3], [f64; 3]) -> String;
+    #[rustfmt::skip]
     let lines: [(&str, Write); 4] = [
-        ("esp", |i, _, f, w| {
-            format!(
-                "I ({}) IMU: {} {}\n",
-                400 + 10 * i,
-                joined(f, 1.0, ", "),
-                joined(w, 1.0, " ")
-            )
-        }),
-        ("json", |_, t, f, w| {
-            format!(
-                "{{\"t\":{t:.2},\"acc\":[{}],\"gyro\":[{}]}}\n",
-                joined(f, 1.0, ","),
-                joined(w, 1.0, ",")
-            )
-        }),
+        ("esp", |i, _, f, w| { format!("I ({}) IMU: {} {}\n", 400 + 10 * i, joined(f, 1.0, ", "), joined(w, 1.0, " ")) }),
+        ("json", |_, t, f, w| { format!("{{\"t\":{t:.2},\"acc\":[{}],\"gyro\":[{}]}}\n", joined(f, 1.0, ","), joined(w, 1.0, ",")) }),
         ("teleplot", |_, t, f, w| {
             let all = ["t", "ax", "ay", "az", "gx", "gy", "gz"]
                 .into_iter()

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use super::super::text_table::Cells;
 use super::super::time::Stamp;
 use super::*;
+use crate::tests::says;
 
 /// A log of PX4's makers, below `$MIMU_DATA` or beside the repository.
 fn real(name: &str) -> Option<PathBuf> {
@@ -77,10 +78,7 @@ fn the_raw_topics_of_an_instance_are_what_pyulog_reads() {
         "{notes:?}"
     );
     let warned = all[0].warnings.join(" ");
-    assert!(
-        warned.contains("dropouts of the logger: 1, 30 ms"),
-        "{warned}"
-    );
+    says(&warned, &["dropouts of the logger: 1, 30 ms"]);
 }
 
 /// `delta_angle` over `delta_angle_dt`, and so for the velocity, by pyulog; here PX4 has an offset of the accelerometer and no other correction.
@@ -115,10 +113,7 @@ fn the_integrals_of_vehicle_imu_are_read_as_means_without_the_calibration() {
         return;
     };
     let error = open(&path, Some("vehicle_imu"), None).unwrap_err();
-    assert!(
-        error.to_string().contains("vehicle_imu instance 2"),
-        "{error}"
-    );
+    says(&error.to_string(), &["vehicle_imu instance 2"]);
     // The mean of twelve at rest, against that of six readings of the raw topics: their scatter is 0.03 to 0.06 m/s².
     let mut all = open(&path, Some("vehicle_imu"), Some(0)).unwrap();
     let rows = self::rows(&mut all[0]);
@@ -196,10 +191,7 @@ fn of_an_old_log_that_does_not_name_its_sensor_nothing_is_undone_and_this_is_sai
     };
     let mut readings = open(&path, None, None).unwrap().remove(0);
     let warned = readings.warnings.join(" ");
-    assert!(
-        warned.contains("accel: the log does not name the device"),
-        "{warned}"
-    );
+    says(&warned, &["accel: the log does not name the device"]);
     let rows = rows(&mut readings);
     assert_eq!((rows.len(), rows[0].0), (2373, Stamp::from(12_262_822_000)));
     close(
@@ -304,10 +296,7 @@ fn an_instance_is_asked_for_where_there_are_several_and_the_instances_are_listed
         "{error}"
     );
     let error = refused(None, Some(7));
-    assert!(
-        error.contains("no instance 7") && error.contains("sensor_gyro instance 0"),
-        "{error}"
-    );
+    says(&error, &["no instance 7", "sensor_gyro instance 0"]);
     let error = refused(Some("sensor_mag"), None);
     assert!(error.contains("no sensor_mag"), "{error}");
     // An accelerometer by itself.
@@ -354,10 +343,12 @@ fn a_topic_that_an_old_version_calibrated_and_nothing_undoes_is_warned_of() {
         .unwrap()
         .remove(0);
     let warned = readings.warnings.join(" ");
-    assert!(
-        warned.contains("sensor_accel instance 0: ")
-            && warned.contains("PX4's calibration is not undone"),
-        "{warned}"
+    says(
+        &warned,
+        &[
+            "sensor_accel instance 0: ",
+            "PX4's calibration is not undone",
+        ],
     );
     let note = readings.notes.join(" ");
     assert!(note.contains("after PX4's calibration"), "{note}");

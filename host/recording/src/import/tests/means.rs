@@ -57,55 +57,28 @@ fn a_table_by_the_names_of_a_recording_needs_no_list_and_no_noise() {
 #[test]
 fn what_is_missing_or_wrong_in_a_table_of_means_is_named() {
     let with = |from: &str, to: &str| TABLE.replace(from, to);
-    for (text, list, says) in [
-        (
-            TABLE.into(),
-            LIST.replace("averaged=n,", ""),
-            "accel_x_sd, but not the number of samples",
-        ),
-        (
-            TABLE.into(),
-            LIST.replace("averaged=n", "t_s=n"),
-            "means have no time",
-        ),
-        (
-            TABLE.into(),
-            LIST.replace("accel_z=az,", ""),
-            "column accel_z is missing",
-        ),
-        (
-            with("250", "2.5"),
-            LIST.into(),
-            "row 3, column averaged: 2.5 is not a number of samples",
-        ),
-        (
-            with("250", ""),
-            LIST.into(),
-            "row 3, column averaged: it is empty, but accel_x is not",
-        ),
-        (
-            with("1,5", ""),
-            LIST.into(),
-            "row 3, column accel_x_sd: it is empty",
-        ),
+    #[rustfmt::skip]
+    let cases = [
+        (TABLE.into(), LIST.replace("averaged=n,", ""), "accel_x_sd, but not the number of samples"),
+        (TABLE.into(), LIST.replace("averaged=n", "t_s=n"), "means have no time"),
+        (TABLE.into(), LIST.replace("accel_z=az,", ""), "column accel_z is missing"),
+        (with("250", "2.5"), LIST.into(), "row 3, column averaged: 2.5 is not a number of samples"),
+        (with("250", ""), LIST.into(), "row 3, column averaged: it is empty, but accel_x is not"),
+        (with("1,5", ""), LIST.into(), "row 3, column accel_x_sd: it is empty"),
         (with("1,5", "-1"), LIST.into(), "-1 is negative"),
-    ] {
+    ];
+    for (text, list, says) in cases {
         let error = imported(&text, &list, &[]).unwrap_err().to_string();
         assert!(error.contains(says), "{error}");
     }
     // A table of means is not taken for samples.
     let error = one_refused("1,2,3,4\n", "accel_x,accel_y,accel_z,averaged");
-    assert!(
-        error.contains("column averaged belongs to a table of means"),
-        "{error}"
-    );
+    says(&error, &["column averaged belongs to a table of means"]);
     // Samples need their rate.
     let text = "format = \"mimu-recording/1\"\ndevice = \"u\"\ngravity_mps2 = 9.8\nraw_unit = \"V\"\nreference = \"gravity\"\n";
     let error = Manifest::parse(text, "recording.toml").unwrap_err();
-    assert!(
-        error
-            .to_string()
-            .contains("missing field `sample_rate_hz`; add the key"),
-        "{error}"
+    says(
+        &error.to_string(),
+        &["missing field `sample_rate_hz`; add the key"],
     );
 }

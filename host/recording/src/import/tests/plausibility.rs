@@ -21,12 +21,9 @@ fn rows_of_zeros_are_padding_and_left_out_counted_wherever_they_are() {
     let text = log(200, |i| if padded(i) { [0; 6] } else { at_rest(i) });
     let (summary, batch, _) = one(&text, BOTH).unwrap();
     assert_eq!((summary.padding, summary.rows), (29, 171));
-    assert!(
-        warned(
-            &summary,
-            "all readings are 0, in 29 rows: left out as padding"
-        ),
-        "{summary:?}"
+    warns(
+        &summary,
+        "all readings are 0, in 29 rows: left out as padding",
     );
     assert!((batch.t_s[0] - 0.07).abs() < 1e-9 && (batch.t_s[170] - 1.79).abs() < 1e-9);
     // The two in the middle are a gap.
@@ -47,12 +44,9 @@ fn rows_of_a_bus_that_did_not_answer_are_left_out_counted() {
     });
     let (summary, batch, _) = one(&text, BOTH).unwrap();
     assert_eq!((summary.padding, summary.rows), (0, 195));
-    assert!(
-        warned(
-            &summary,
-            "all six readings are the same number, in 5 rows: the sensor's bus did not answer: left out"
-        ),
-        "{summary:?}"
+    warns(
+        &summary,
+        "all six readings are the same number, in 5 rows: the sensor's bus did not answer: left out",
     );
     assert!(batch.raw.iter().flatten().all(|v| *v != 32767.0));
     let error = one_refused(&log(50, |_| [-1; 6]), BOTH);
@@ -67,30 +61,21 @@ fn a_sensor_that_was_not_connected_is_left_out_and_a_dead_axis_is_named() {
     });
     let (summary, batch, _) = one(&text, BOTH).unwrap();
     assert!(batch.raw[0].is_empty() && batch.raw[5].len() == 100);
-    assert!(
-        warned(&summary, "gyro: it is exactly 0 on all axes"),
-        "{summary:?}"
-    );
+    warns(&summary, "gyro: it is exactly 0 on all axes");
     let text = log(100, |i| {
         let [a, b, c, ..] = at_rest(i);
         [a, b, c, 0, 0, 0]
     });
     let (summary, batch, _) = one(&text, BOTH).unwrap();
     assert!(batch.raw[3].is_empty() && batch.raw[1].len() == 100);
-    assert!(
-        warned(&summary, "accel: it is exactly 0 on all axes"),
-        "{summary:?}"
-    );
+    warns(&summary, "accel: it is exactly 0 on all axes");
     let text = log(100, |i| {
         let [a, b, _, x, y, z] = at_rest(i);
         [a, b, 0, x, y, z]
     });
     let (summary, batch, _) = one(&text, BOTH).unwrap();
     assert_eq!(batch.raw[2].len(), 100);
-    assert!(
-        warned(&summary, "gyro_z: the channel is stuck at 0 throughout"),
-        "{summary:?}"
-    );
+    warns(&summary, "gyro_z: the channel is stuck at 0 throughout");
     // A gyro at rest may read 0 now and then; an accelerometer does not.
     let text = log(100, |i| {
         let [a, b, c, x, y, z] = at_rest(i);
@@ -112,14 +97,15 @@ fn counts_taken_for_degrees_are_refused_unless_a_factor_and_an_offset_make_them_
     let text: String = (0..100).map(row).collect();
     let list = "t_s,gyro_x,gyro_y,gyro_z,temp_c";
     let error = one_refused(&text, list);
-    for words in [
-        "column temp_c",
-        "100 of 100",
-        "-7049 in row 1",
-        "or skip the column",
-    ] {
-        assert!(error.contains(words), "{error}");
-    }
+    says(
+        &error,
+        &[
+            "column temp_c",
+            "100 of 100",
+            "-7049 in row 1",
+            "or skip the column",
+        ],
+    );
     let bench = Bench::new(&[("a", &text)]);
     let mut options = bench.options(&["a"], &[list]);
     options.log.scale = vec!["temp_c=0.00294118".parse().unwrap()];
@@ -153,12 +139,9 @@ fn a_few_impossible_temperatures_are_left_empty_and_kelvins_are_warned_of() {
     let text = log(&|i| if i % 40 == 7 { -7049.0 } else { 21.0 });
     let (summary, batch, _) = one(&text, list).unwrap();
     assert_eq!(batch.temp_c.iter().filter(|c| c.is_nan()).count(), 3);
-    assert!(
-        warned(&summary, "3 of 100 values cannot be temperatures"),
-        "{summary:?}"
-    );
+    warns(&summary, "3 of 100 values cannot be temperatures");
     let (summary, _, _) = one(&log(&|_| 294.0), list).unwrap();
-    assert!(warned(&summary, "offset of -273.15"), "{summary:?}");
+    warns(&summary, "offset of -273.15");
     let (summary, _, _) = one(&log(&|i| -40.0 + i as f64), list).unwrap();
     assert!(!warned(&summary, "temp_c"), "{summary:?}");
 }
