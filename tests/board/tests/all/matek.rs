@@ -9,15 +9,13 @@ use mimu_board::inertial::{Feed, Sensed};
 use mimu_board::running::Board;
 use mimu_board_tests::conversation::{Answer, Conversation, Sample};
 use mimu_board_tests::{MS, digital_image};
+use mimu_core::PerSensor;
 use mimu_core::compensation::{Affine, Compensation, Sample as SiSample};
 use mimu_core::effects::DeviceEffect;
 use mimu_core::single;
-use mimu_core::stored::{
-    Curves, MAX_LENGTH, Origin, RawUnit, Setting, StoredError, decode, encode,
-};
+use mimu_core::stored::{Curves, MAX_LENGTH, Origin, RawUnit, Setting, decode, encode};
 use mimu_core::table::Node;
-use mimu_core::wire::{BatchHead, Refusal, Request, Verdict, flags, reading};
-use mimu_core::{PerSensor, Sensor};
+use mimu_core::wire::{BatchHead, Request, Verdict, flags, reading};
 use nalgebra::{Matrix3, Vector3};
 
 /// The clock on the z axis, g/s, and its first value, g.
