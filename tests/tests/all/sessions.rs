@@ -126,7 +126,7 @@ fn sessions_that_lost_samples_contradict_themselves_and_no_order_changes_the_ans
                 Calibration::of_sessions(&all, "2026-01-01T00:00:00Z").expect("a calibration");
             let said = &made.judgement.reason;
             assert_eq!(made.judgement.kind, JudgementKind::Suspect, "{said}");
-            says(&said, &["contradict themselves and are not used: gyro: "]);
+            says(said, &["contradict themselves and are not used: gyro: "]);
         }
         // One that is good is enough to show it; two that are bad alike may be what the model lacks.
         let few = |which: &[usize]| combined(which.iter().map(|s| fits[*s].clone()).collect());

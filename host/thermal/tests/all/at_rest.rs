@@ -86,7 +86,7 @@ fn there_and_back_shows_the_biases_of_the_gyro_and_names_what_is_inseparable() {
     let lag = result.sensors.gyro.as_ref().unwrap().lag_s.unwrap();
     assert!(lag.lower < 66.0 && lag.upper > 54.0, "{lag:?}");
     let accel = result.sensors.accel.as_ref().unwrap();
-    says(&accel.inseparable.unwrap(), &["scale factor times gravity"]);
+    says(accel.inseparable.unwrap(), &["scale factor times gravity"]);
     assert!(result.curve("gyro_scale_x").is_none());
     for sensor in [result.sensors.gyro.as_ref().unwrap(), accel] {
         assert_eq!(sensor.unit, "V");

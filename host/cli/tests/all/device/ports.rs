@@ -75,7 +75,7 @@ fn a_sensor_that_is_missing_is_named_with_what_it_reads() {
     };
     let told = info(script, &["--json", "-"]).json();
     let warning = told["warnings"][0].as_str().unwrap();
-    says(&warning, &["WHO_AM_I reads 0x00, and 0x47 was expected"]);
+    says(warning, &["WHO_AM_I reads 0x00, and 0x47 was expected"]);
     assert_eq!(told["wrong_register"]["found"], 0);
 }
 

@@ -128,7 +128,7 @@ fn the_terminal_is_given_back_after_the_end_by_a_key_and_by_control_c() {
         let (entered, left) = (seen.find(ENTERED).unwrap(), seen.rfind(LEFT).unwrap());
         assert!(entered < left, "{seen:?}");
         let rest = &seen[left..];
-        says(&rest, &["ended; the same command resumes here"]);
+        says(rest, &["ended; the same command resumes here"]);
         assert_eq!(code, Some(0), "{seen:?}");
     }
 }

@@ -47,7 +47,7 @@ fn calibration_and_mounting_are_undone_by_the_parameters_of_the_time_of_each_rea
     assert_eq!(all.len(), 1);
     let notes = &all[0].notes[0];
     says(
-        &notes,
+        notes,
         &[
             "24 messages IMU of instance 0, ArduPilot's calibration undone",
             "scale factor 1.250000 0.500000 2.000000",
