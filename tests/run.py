@@ -25,11 +25,18 @@ def executables(cargo: list[str]) -> list[tuple[str, str]]:
     return sorted(found, key=lambda test: -os.path.getsize(test[1]))
 
 
-def run(folder: str, executable: str) -> tuple[str, int, float, str]:
+def environment(cargo: list[str]) -> dict[str, str]:
+    """As cargo sets it. A test that builds a program takes the same compiler, and is not linted."""
+    kept = {name: value for name, value in os.environ.items() if name not in ("RUSTC_WORKSPACE_WRAPPER", "CLIPPY_ARGS")}
+    toolchain = [word[1:] for word in cargo if word.startswith("+")]
+    return kept | {"RUSTUP_TOOLCHAIN": toolchain[0]} if toolchain else kept
+
+
+def run(folder: str, executable: str, env: dict[str, str]) -> tuple[str, int, float, str]:
     """What cargo would run, in the same folder."""
     began = time.monotonic()
     done = subprocess.run(
-        [executable], cwd=folder, env=os.environ | {"CARGO_MANIFEST_DIR": folder}, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+        [executable], cwd=folder, env=env | {"CARGO_MANIFEST_DIR": folder}, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
         errors="replace", check=False,
     )
     return f"{os.path.relpath(folder)} {os.path.basename(executable)}", done.returncode, time.monotonic() - began, done.stdout
@@ -39,7 +46,7 @@ def main() -> None:
     cargo = sys.argv[1:]
     failed = []
     with ThreadPoolExecutor(AT_A_TIME) as pool:
-        jobs = [pool.submit(run, *test) for test in executables(cargo)]
+        jobs = [pool.submit(run, *test, environment(cargo)) for test in executables(cargo)]
         for job in as_completed(jobs):
             name, code, seconds, output = job.result()
             results = [line for line in output.splitlines() if line.startswith("test result:")]
