@@ -20,7 +20,7 @@ PUBLISHED := mimu-core mimu-recording mimu-allan mimu mimu-thermal mimu-device m
 BUILT := $(or $(CARGO_TARGET_DIR),target)/debug/.tests-built
 
 # Stages of `make test`; each can be run alone, as in `make clippy`. Tests are linked before they run, so that both times are shown.
-STAGES := fmt images no-panic build-tests clippy rustdoc tests
+STAGES := fmt clippy rustdoc images no-panic build-tests tests
 
 .PHONY: help data test $(STAGES) run-tests interop python nightly dist book msrv package wheel web web-tests demo faults example station papers blind clumsy bench budget count device fuzz audit toolchain
 
@@ -46,10 +46,10 @@ test: toolchain ## formatting, lints, documentation, firmware, all tests but the
 # A fresh build compiles each crate once, so intermediate results for incremental builds are not needed. The demo and the faults use the builds of the
 # tests: with another setting they would compile the workspace again.
 test $(STAGES) run-tests interop demo faults nightly: export CARGO_INCREMENTAL = 0
-# Clippy's driver compiles as rustc does: libraries, tests, programs and images are linted where they are built. A compile of their own for lints took four
-# minutes of processor time. The flags are those of `cargo clippy -- -D warnings`.
-test $(STAGES) run-tests interop demo faults: export RUSTC_WORKSPACE_WRAPPER = clippy-driver
-test $(STAGES) run-tests interop demo faults: export CLIPPY_ARGS = -D__CLIPPY_HACKERY__warnings__CLIPPY_HACKERY__
+# Lints and documentation share one check of the workspace: both run clippy's driver, with the flags of `cargo clippy -- -D warnings`. What runs is not built
+# by it: it leaves out optimisations of rustc, and the image would not fit its budget.
+clippy rustdoc: export RUSTC_WORKSPACE_WRAPPER = clippy-driver
+clippy rustdoc: export CLIPPY_ARGS = -D__CLIPPY_HACKERY__warnings__CLIPPY_HACKERY__
 # Tests of devices and of the wizard wait for answers more than they compute.
 test tests run-tests: export RUST_TEST_THREADS = 3
 # Tests of Python use the extension module that `build-tests` has compiled; `make python` alone builds and tests the wheel.
@@ -58,12 +58,16 @@ test tests: export MIMU_LIBRARY = $(abspath $(or $(CARGO_TARGET_DIR),target))/de
 fmt:
 	$(CARGO) fmt --all --check
 
-# With what no other stage compiles.
-clippy: images build-tests
+clippy:
+	$(CARGO) check --locked $(ON_PC) --exclude mimu-firmware --all-targets
 	$(CARGO) check --locked -p mimu-recording --no-default-features
 	$(CARGO) check --locked -p mimu-recording --no-default-features --target $(WEB_TARGET)
 	@# The page's C libraries are not needed to check Rust: nothing is linked.
 	CC_wasm32_wasip1=true AR_wasm32_wasip1=true $(CARGO) check --locked -p mimu-web --target $(WEB_TARGET)
+	$(CARGO) check --locked -p mimu-firmware -p mimu-counted -p mimu-no-panic --profile image --target $(TARGET)
+	$(CARGO) check --locked -p mimu-firmware --profile image --features usb --target $(TARGET)
+	$(CARGO) check --locked -p mimu-firmware --profile image --features matek-h743 --target $(TARGET)
+	$(CARGO) check --locked -p mimu-firmware --profile image --features matek-h743,usb --target $(TARGET)
 
 rustdoc:
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --locked --no-deps
@@ -84,7 +88,7 @@ no-panic:
 
 # With the libraries, so that the extension module for Python is built with the features that the tests need: no crate is compiled twice.
 build-tests:
-	$(CARGO) build --locked $(ON_PC) --lib --tests --benches --examples
+	$(CARGO) build --locked $(ON_PC) --lib --tests
 	@touch $(BUILT)
 
 # Side by side: much of each is waiting.
@@ -144,7 +148,7 @@ demo: toolchain ## calibrate and verify a board on the virtual bench; SEED=n is 
 	@if [ $(BOARD) = matek ]; then $(MATEK) && cp $(IMAGES)/mimu-firmware $(IMAGES)/mimu-firmware-matek-h743; fi
 	@$(FIRMWARE)
 	@if [ -e $(BUILT) ] && [ -z "$$(find core host rig tests -name '*.rs' -newer $(BUILT) -print -quit)" ]; \
-	then $(CARGO) build --locked $(ON_PC) --lib --tests --benches --examples; \
+	then $(CARGO) build --locked $(ON_PC) --lib --tests; \
 	else $(CARGO) build --locked -p mimu-cli -p mimu-board-tests --bin mimu --bin demo; fi
 	@rm -rf $(DEMO)
 	@target/debug/demo $(SEED) $(DEMO) $(BOARD)
