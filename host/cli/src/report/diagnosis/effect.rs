@@ -89,11 +89,25 @@ fn compact(a: &Accepted) -> Markup {
     html! {
         @for of_unit in all.chunk_by(|a, b| a.unit == b.unit) {
             @let Readable { factor, unit } = readable::coefficient(&of_unit[0].unit);
-            @let each: Vec<String> = of_unit.iter().map(|c| format!("{}\u{a0}{}", c.name, plus_minus(c.value * factor, half(c) * factor))).collect();
-            p { (each.join(", ")) " " (unit) }
+            @let values: Vec<String> = of_unit.iter().map(|c| plus_minus(c.value * factor, half(c) * factor)).collect();
+            @if of_unit.len() == 9 { pre { (matrix(of_unit, &values)) " " (unit) } } @else {
+                @let each: Vec<String> = of_unit.iter().zip(&values).map(|(c, value)| format!("{}\u{a0}{value}", c.name)).collect();
+                p { (each.join(", ")) " " (unit) }
+            }
         }
         @if let Some(form) = a.effect.nonlinear_parameter() { p { (form.name) " " (significant(form.value)) " (95 %: " (form.interval()) ")" } }
     }
+}
+
+/// Nine coefficients, three in a line.
+fn matrix(all: &[WrittenCoefficient], values: &[String]) -> String {
+    let width = values.iter().map(|value| value.chars().count()).max();
+    let cell = |(c, value): (&WrittenCoefficient, &String)| {
+        format!("{} {value:>width$}", c.name, width = width.unwrap_or(0))
+    };
+    let cells: Vec<String> = all.iter().zip(values).map(cell).collect();
+    let lines: Vec<String> = cells.chunks(3).map(|line| line.join("   ")).collect();
+    lines.join("\n")
 }
 
 fn figure(a: &Accepted, picture: &Picture, panels: &[Panel]) -> Markup {
