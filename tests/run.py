@@ -44,6 +44,8 @@ def run(folder: str, executable: str, env: dict[str, str]) -> tuple[str, int, fl
 
 def main() -> None:
     cargo = sys.argv[1:]
+    # The job server of make is not handed down through Python.
+    os.environ.pop("MAKEFLAGS", None)
     failed = []
     with ThreadPoolExecutor(AT_A_TIME) as pool:
         jobs = [pool.submit(run, *test, environment(cargo)) for test in executables(cargo)]
