@@ -166,7 +166,7 @@ pub struct LogOptions {
     /// Separator of text files: comma, semicolon, tab, whitespace, or all characters that separate cells: `,;*` [default: recognised]
     #[cfg_attr(feature = "clap", arg(long))]
     pub separator: Option<Separator>,
-    /// Characters that begin a comment line in text files, or none [default: #%]
+    /// Characters that begin a comment line in text files, or none; by default these are # and %
     #[cfg_attr(feature = "clap", arg(long, value_name = "SIGNS"))]
     pub comment: Option<CommentSigns>,
     /// Leave out rows that cannot be read: at most this number (`=20`), or this share of each file (`=2%`) [without a value: 1%]
