@@ -93,7 +93,7 @@ build-tests:
 
 # Side by side: much of each is waiting.
 tests:
-	$(MAKE) --no-print-directory -j3 --output-sync=line run-tests interop python
+	$(MAKE) --no-print-directory -j3 run-tests interop python
 
 run-tests:
 	python3 tests/run.py $(CARGO) test --locked $(ON_PC)
