@@ -77,7 +77,7 @@ pub struct SensorVerification {
     /// What explains the mean square of the errors; absent if the recording does not distinguish the causes.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub causes: Option<Causes>,
-    /// The biases of other power-ons within the recording, which no other figure contains; absent without any.
+    /// The biases of other power-ons within the recording, which are in this figure alone; absent without any.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub bias_moved: Vec<BiasMoved>,
 }

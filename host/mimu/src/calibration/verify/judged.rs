@@ -88,7 +88,7 @@ fn figures(
 }
 
 /// How the errors of `sensor` in this recording compare with the noise and with what the calibration's parameters are known to err by. `None` if the noise is
-/// unknown, or if nothing judges the sensor. A change of the biases is tested by itself too: three numbers show little among the errors of many dwells. `taken`: degrees
+/// unknown, or if nothing judges the sensor. A change of the biases has a test for itself too: three numbers show little among the errors of many dwells. `taken`: degrees
 /// of freedom that the biases of other power-ons took.
 pub(super) fn test(
     prepared: &Prepared,
