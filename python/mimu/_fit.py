@@ -260,7 +260,6 @@ def fit(
     recording: Recording,
     *,
     holdout: int = 4,
-    method: Literal["least-squares", "kalman", "inverse-form", "six-positions"] | None = None,
     only: Sensor | None = None,
     still: float | None = None,
     steps: Steps | None = None,
@@ -280,8 +279,6 @@ def fit(
         Dwells at rest in several poses, with turns between them for the gyro; or dwells with known inputs.
     holdout : int
         Blocks of time that are left out in turn, so that the error on them can be reported; 0 for none.
-    method : str, optional
-        Estimator, if the input is known.
     only : {"gyro", "accel"}, optional
         Calibrates one sensor.
     still : float, optional
@@ -319,7 +316,7 @@ def fit(
     >>> fit.judgement.kind, fit.gyro.parameters["scale_x"].value
     """
     options = dict(
-        holdout=holdout, method=method, only=only, still=still, steps=steps, keep=kept(keep), prior=prior, whole_turns=whole_turns,
+        holdout=holdout, only=only, still=still, steps=steps, keep=kept(keep), prior=prior, whole_turns=whole_turns,
         placement=placement, reference_error=reference_error, part=part,
     )
     return Fit(_mimu.fit(recording, arguments(options), noise=noise_of(noise)))

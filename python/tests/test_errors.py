@@ -82,10 +82,8 @@ def test_options_that_there_are_not_are_errors_of_type_or_value(arrays: mimu.Rec
         mimu.export("px4", calibration=calibration, qgroundcontrol=True)
     with pytest.raises(ValueError, match="cannot be used with"):
         mimu.design(n=3, scheme="six-face")
-    with pytest.raises(mimu.Error, match="^method: invalid value 'best'.*least-squares"):
-        mimu.fit(arrays, method="best")
-    with pytest.raises(mimu.Error, match="reference is"):
-        mimu.fit(arrays, method="kalman")
+    with pytest.raises(mimu.Error, match="^only: invalid value 'best'.*accel"):
+        mimu.fit(arrays, only="best")
     with pytest.raises(mimu.Error, match="one other recording"):
         mimu.diagnose(arrays, verify=[arrays, arrays])
 

@@ -1,16 +1,15 @@
 //! fang, section 5.1: its Table 3 and noise, with six positions and its nine.
 
-use mimu::estimate::known_input::{kalman, least_squares};
-use mimu::estimate::six_positions::six_positions;
-use mimu::estimate::{EarthShare, Estimated, Observation};
+use mimu::estimate::known_input::least_squares;
+use mimu::estimate::{EarthShare, Observation};
 use mimu::plan::design::schemes::{FANG_FILTERS, Scheme};
 use mimu::quantity::Sensor;
 use mimu::triad::{Angles, Forward, Physical};
-use mimu_core::kalman::Filter;
 use mimu_rig::ideal::{self, FANG_TABLE_3, Ideal};
 use mimu_rig::random::Random;
 use nalgebra::{Matrix3, Vector3};
 
+use crate::published::{kalman, six_positions};
 use mimu_tests::page::{Block, Table, significant};
 
 /// Runs of the Monte Carlo.
@@ -92,32 +91,14 @@ fn physical(forward: &Forward, angles: Angles) -> [Vector3<f64>; 4] {
 }
 
 fn estimate(contender: &Contender, dwells: &[Observation]) -> Forward {
-    let forward = |e: Result<Estimated, _>| e.expect("determined").triad.forward;
     match contender.estimator {
-        Estimator::Scalar => forward(six_positions(dwells)),
-        Estimator::LeastSquares => forward(least_squares(dwells, None)),
-        Estimator::Kalman => forward(kalman(dwells, None)),
-        Estimator::KalmanOfFour => {
-            let mut found = Forward {
-                matrix: Matrix3::zeros(),
-                bias: Vector3::zeros(),
-            };
-            for (axis, chosen) in FANG_FILTERS.iter().enumerate() {
-                let mut filter = Filter::<f64>::diffuse(dwells[0].variance[axis], 1.0);
-                for &k in chosen {
-                    let o = &dwells[k];
-                    filter
-                        .update(&o.input, o.raw[axis], o.variance[axis])
-                        .expect("finite");
-                }
-                let mean = filter.mean();
-                found.bias[axis] = mean[0];
-                for j in 0..3 {
-                    found.matrix[(axis, j)] = mean[j + 1];
-                }
-            }
-            found
+        Estimator::Scalar => six_positions(dwells),
+        Estimator::LeastSquares => {
+            let found = least_squares(dwells, &[], None).expect("determined");
+            found.triad.forward
         }
+        Estimator::Kalman => kalman(dwells, &[0; 3].map(|_| (0..dwells.len()).collect())),
+        Estimator::KalmanOfFour => kalman(dwells, &FANG_FILTERS.map(|four| four.to_vec())),
     }
 }
 

@@ -34,9 +34,8 @@ pub fn blocks() -> Vec<Block> {
         ("listed order, noise known", Dwells::AsListedWithNoise),
     ] {
         for tally in with_a_table(RUNS, dwells) {
-            if let Some(sensor) = tally.name.strip_prefix("least squares, ") {
-                row(format!("{order}, {sensor}"), &tally);
-            }
+            let name = tally.name.replace("known inputs", order);
+            row(name, &tally);
         }
     }
     for quiet in [false, true] {

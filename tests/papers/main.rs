@@ -8,6 +8,7 @@ mod fang;
 mod intervals;
 mod niu;
 mod plot;
+mod published;
 mod schemes;
 mod xu;
 mod xu_table_3;

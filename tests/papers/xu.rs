@@ -1,7 +1,6 @@
 //! xu: its schedules, Tables 1 and 2 as truth, and the scatter of its five repeats as noise.
 
-use mimu::estimate::known_input::{inverse_form, least_squares, opposite_rates};
-use mimu::estimate::{EarthShare, Estimated, Failure, Observation};
+use mimu::estimate::{EarthShare, Observation};
 use mimu::plan::design::schemes::Scheme;
 use mimu::quantity::Sensor;
 use mimu_core::compensation::Affine;
@@ -9,6 +8,7 @@ use mimu_rig::ideal::Inverse;
 use mimu_rig::random::Random;
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
+use crate::published::{Estimator, inverse_by_least_squares, inverse_form, opposite_rates};
 use mimu_tests::page::{Block, Table, significant};
 
 /// Runs of the Monte Carlo.
@@ -62,9 +62,6 @@ pub fn averages(table: &[[f64; 5]; 12]) -> Affine<f64> {
         offset: Vector3::from_fn(|i, _| mean(&table[9 + i])),
     }
 }
-
-/// An estimator of a triad.
-pub type Estimator = fn(&[Observation]) -> Result<Estimated, Failure>;
 
 /// One of the two experiments: inputs in the paper's units, its repeats and its estimator.
 pub struct Experiment {
@@ -137,7 +134,7 @@ impl Experiment {
         let mut random = Random::new(0, "xu gains");
         let dwells = self.dwells(&averages(self.table), [step; 3], &mut random);
         let of = |dwells: &[Observation]| {
-            let found = (self.estimator)(dwells).expect("determined").triad.inverse;
+            let found = (self.estimator)(dwells);
             mimu::triad::vector(&found.matrix, &found.offset)
         };
         let (plain, mut squares) = (of(&dwells), [0.0; 12]);
@@ -178,7 +175,7 @@ impl Experiment {
     pub fn estimators(&self) -> [(&'static str, Estimator); 2] {
         [
             ("xu's inverse form", self.estimator),
-            ("least squares, forward form", |o| least_squares(o, None)),
+            ("least squares, forward form", inverse_by_least_squares),
         ]
     }
 
@@ -227,10 +224,7 @@ fn simulated(experiment: &Experiment) -> [f64; 12] {
         let mut random = Random::new(run, "xu repeats");
         let unit = experiment.of_the_day(&rest, &mut random);
         let dwells = experiment.dwells(&unit, sigma, &mut random);
-        let found = (experiment.estimator)(&dwells)
-            .expect("determined")
-            .triad
-            .inverse;
+        let found = (experiment.estimator)(&dwells);
         for (k, square) in squares.iter_mut().enumerate() {
             let value = if k < 9 {
                 found.matrix[(k / 3, k % 3)]
@@ -262,7 +256,7 @@ fn estimators(experiments: [&Experiment; 2]) -> Table {
                 let unit = experiment.of_the_day(rest, &mut random);
                 let dwells = experiment.dwells(&unit, *sigma, &mut random);
                 let (_, estimator) = experiment.estimators()[k];
-                let found = estimator(&dwells).expect("determined").triad.inverse;
+                let found = estimator(&dwells);
                 c += (found.matrix - unit.matrix).norm_squared();
                 o += (found.offset - unit.offset).norm_squared();
             }

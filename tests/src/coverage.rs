@@ -2,7 +2,7 @@
 
 use std::sync::Mutex;
 
-use mimu::fit::{Fit, Method, Options, fit};
+use mimu::fit::{Fit, Options, fit};
 use mimu::quantity::Sensor;
 use mimu::triad::Triad;
 use mimu_recording::{Turntable, TurntableRate};
@@ -79,14 +79,6 @@ impl Tally {
     }
 }
 
-fn options(method: Method) -> Options {
-    Options {
-        method,
-        holdout_blocks: 0,
-        only: None,
-    }
-}
-
 fn triad(fit: &Fit, sensor: Sensor) -> &Triad {
     &fit.sensor(sensor).expect("recorded").estimated.triad
 }
@@ -131,32 +123,10 @@ pub enum Dwells {
     AsListedWithNoise,
 }
 
-/// All estimators for known inputs, for both sensors, on recordings from a table. If the noise of the unit at rest is given, only the two that can
-/// use it.
+/// Least squares for both sensors on recordings from a table.
 pub fn with_a_table(runs: u64, dwells: Dwells) -> Vec<Tally> {
-    let methods = [
-        ("least squares", Method::LeastSquares),
-        ("Kalman bank", Method::Kalman),
-        ("inverse form (xu)", Method::InverseForm),
-        ("six positions", Method::SixPositions),
-    ];
-    let methods = match dwells {
-        Dwells::AsListedWithNoise => &methods[..2],
-        _ => &methods[..],
-    };
     let all: Vec<usize> = (0..12).collect();
-    // Six positions determine only scale factors and biases.
-    let diagonal = [0, 4, 8, 9, 10, 11];
-    let mut empty = Vec::new();
-    for &(name, method) in methods {
-        for sensor in Sensor::BOTH {
-            let free = match method {
-                Method::SixPositions => &diagonal[..],
-                _ => &all,
-            };
-            empty.push(Tally::new(format!("{name}, {sensor}"), free));
-        }
-    }
+    let empty = Sensor::BOTH.map(|s| Tally::new(format!("known inputs, {s}"), &all));
     over(runs, &empty, |seed, tallies| {
         let plan = bench::table_plan((dwells == Dwells::Randomised).then_some(seed));
         let file = bench::drawn(seed, "unit");
@@ -166,12 +136,10 @@ pub fn with_a_table(runs: u64, dwells: Dwells) -> Vec<Tally> {
             let noise = bench::noise_file(&file, seed, prepared.condensed.period_s);
             prepared = prepared.with_noise(&noise).expect("a noise file");
         }
-        for (m, (name, method)) in methods.iter().enumerate() {
-            let fitted = fit(prepared.clone(), options(*method))
-                .unwrap_or_else(|e| panic!("{name}, seed {seed}: {e}"));
-            for (k, sensor) in Sensor::BOTH.into_iter().enumerate() {
-                tallies[2 * m + k].add(triad(&fitted, sensor), &truths[k]);
-            }
+        let fitted = fit(prepared, Options::IN_SAMPLE)
+            .unwrap_or_else(|e| panic!("known inputs, seed {seed}: {e}"));
+        for (k, sensor) in Sensor::BOTH.into_iter().enumerate() {
+            tallies[k].add(triad(&fitted, sensor), &truths[k]);
         }
     })
 }
@@ -187,11 +155,8 @@ pub fn with_turning_inputs(runs: u64) -> (Vec<Tally>, [Vec<f64>; 2]) {
         let file = bench::drawn(seed, "unit");
         let truths = of_the_session(&plan, &file, seed);
         let unit = RigTruth::resolve(&file, seed).expect("a rig").unit;
-        let fitted = fit(
-            bench::recorded(&plan, &file, seed),
-            options(Method::LeastSquares),
-        )
-        .unwrap_or_else(|e| panic!("inputs that turn, seed {seed}: {e}"));
+        let fitted = fit(bench::recorded(&plan, &file, seed), Options::IN_SAMPLE)
+            .unwrap_or_else(|e| panic!("inputs that turn, seed {seed}: {e}"));
         for (k, sensor) in Sensor::BOTH.into_iter().enumerate() {
             tallies[k].add(triad(&fitted, sensor), &truths[k]);
             let found = fitted.sensor(sensor).expect("recorded").estimated.delays;
@@ -231,11 +196,8 @@ pub fn by_hand(runs: u64, quiet: bool) -> Vec<Tally> {
             file.unit.gyro_axes.walk_si = Some([0.0; 3]);
         }
         let truths = of_the_session(&plan, &file, seed);
-        let fitted = fit(
-            bench::recorded(&plan, &file, seed),
-            options(Method::LeastSquares),
-        )
-        .unwrap_or_else(|e| panic!("by hand, seed {seed}: {e}"));
+        let fitted = fit(bench::recorded(&plan, &file, seed), Options::IN_SAMPLE)
+            .unwrap_or_else(|e| panic!("by hand, seed {seed}: {e}"));
         for (k, sensor) in Sensor::BOTH.into_iter().enumerate() {
             tallies[k].add(triad(&fitted, sensor), &truths[k]);
         }
@@ -262,7 +224,7 @@ pub fn on_a_record_player(runs: u64, rate_error: f64) -> Vec<Tally> {
         let turntable = Turntable::new(&rates, rate_error);
         let truths = of_the_session(&plan, &file, seed);
         let prepared = bench::on_a_turntable(&plan, &file, seed, turntable);
-        let fitted = fit(prepared, options(Method::LeastSquares))
+        let fitted = fit(prepared, Options::IN_SAMPLE)
             .unwrap_or_else(|e| panic!("record player, seed {seed}: {e}"));
         for (k, sensor) in Sensor::BOTH.into_iter().enumerate() {
             tallies[k].add(triad(&fitted, sensor), &truths[k]);

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use mimu::fit::{Fit, Method, Options, fit};
+use mimu::fit::{Fit, Options, fit};
 use mimu::prepared::Prepared;
 use mimu::signal::stillness::STILL_FACTOR;
 use mimu::triad::half_width_95;
@@ -73,17 +73,12 @@ impl Foreign<'_> {
         Recording::open(&out)
     }
 
-    /// Imports it, finds its dwells and fits it by `method`; four blocks are held out in turn.
-    pub fn fit(&self, method: Method) -> Result<Fit> {
+    /// Imports it, finds its dwells and fits it; four blocks are held out in turn.
+    pub fn fit(&self) -> Result<Fit> {
         let folder = TempDir::new().expect("there is a temporary folder");
         let recording = self.import(&folder)?;
-        let options = Options {
-            method,
-            holdout_blocks: 4,
-            only: None,
-        };
         let prepared = Prepared::read(&recording, STILL_FACTOR, |_| {})?;
-        fit(prepared, options)
+        fit(prepared, Options::default())
     }
 }
 
@@ -105,7 +100,7 @@ pub fn xsens_session() -> Option<Foreign<'static>> {
 
 /// [`xsens_session`], calibrated.
 pub fn xsens() -> Option<Fit> {
-    let fit = xsens_session()?.fit(Method::LeastSquares);
+    let fit = xsens_session()?.fit();
     Some(fit.expect("it can be fitted"))
 }
 
@@ -124,7 +119,7 @@ pub fn mikoff_session(unit: usize) -> Option<Foreign<'static>> {
 
 /// [`mikoff_session`], calibrated.
 pub fn mikoff(unit: usize) -> Option<Fit> {
-    let fit = mikoff_session(unit)?.fit(Method::LeastSquares);
+    let fit = mikoff_session(unit)?.fit();
     Some(fit.expect("it can be fitted"))
 }
 

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::fs;
 
-use mimu::fit::{Fit, Method, Options, fit};
+use mimu::fit::{Fit, Options, fit};
 use mimu::parameter::TriadParameter;
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
@@ -503,13 +503,8 @@ pub fn of_array_recorded(unit: usize, session: usize) -> Option<(TempDir, Record
 pub fn of_array(unit: usize) -> Option<Vec<Fit>> {
     let of = |session: usize| {
         let (_folder, recording) = of_array_recorded(unit, session)?;
-        let options = Options {
-            method: Method::LeastSquares,
-            holdout_blocks: 4,
-            only: None,
-        };
         let prepared = Prepared::read(&recording, STILL_FACTOR, |_| {}).expect("it has dwells");
-        Some(fit(prepared, options).expect("it can be fitted"))
+        Some(fit(prepared, Options::default()).expect("it can be fitted"))
     };
     (0..ARRAY_SESSIONS).into_par_iter().map(of).collect()
 }

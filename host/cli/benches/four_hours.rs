@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use mimu::fit::{Method, Options, fit};
+use mimu::fit::{Options, fit};
 use mimu::prepared::Prepared;
 use mimu_recording::{
     Batch, ColumnList, Columns, ImportOptions, Manifest, RawUnit, Recording, Reference,
@@ -114,12 +114,7 @@ fn by_hand(folder: &Path) {
         .expect("known to be good");
     let reading = start.elapsed();
     let start = Instant::now();
-    let options = Options {
-        method: Method::LeastSquares,
-        holdout_blocks: 4,
-        only: None,
-    };
-    fit(prepared, options).expect("known to be good");
+    fit(prepared, Options::default()).expect("known to be good");
     println!(
         "recording by hand, 51 175 rows: read in {:.0} ms, accelerometer, gyro and four held-out refits in {:.0} ms",
         reading.as_secs_f64() * 1e3,

@@ -6,7 +6,7 @@ use crate::calibration::verify::verify;
 use crate::calibration::{Calibration, FIGURE_DIGITS};
 use crate::diagnose::{Diagnosis, Heard, Recordings, diagnose_heard};
 use crate::effects::fitted::FittedEffect;
-use crate::fit::{Method, Options};
+use crate::fit::Options;
 use crate::plan::next_experiment::{self, Next};
 use crate::quantity::{PerSensor, rounded};
 use crate::result::diagnosis::DiagnosisResult;
@@ -38,7 +38,6 @@ pub fn diagnosed(
     heard: Heard,
 ) -> Result<Diagnosed> {
     let options = Options {
-        method: Method::LeastSquares,
         holdout_blocks: 0,
         only: None,
     };

@@ -50,40 +50,13 @@ pub use biases::fit_biases;
 pub use hold_out::{HoldOut, Split};
 pub use sensor::{Residual, SensorFit};
 
-/// How a triad with known input is estimated.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Method {
-    /// Forward form, batch: fang (15), (17).
-    LeastSquares,
-    /// Forward form, recursive: fang (23)-(28).
-    Kalman,
-    /// Inverse form: xu (3)-(11) for the gyro, (12)-(16) for the accelerometer.
-    InverseForm,
-    /// Six positions: scale factors and biases only.
-    SixPositions,
-}
-
 /// What to fit and how to judge it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Options {
-    /// Estimator if the input is known.
-    pub method: Method,
     /// Number of parts that are held out in turn: contiguous blocks, if the rest determines the model. 0: none.
     pub holdout_blocks: usize,
     /// Calibrate this triad only. Without a table the gyro needs the accelerometer, which is then calibrated as well.
     pub only: Option<Sensor>,
-}
-
-impl Method {
-    /// Name for people and files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::LeastSquares => "least squares",
-            Self::Kalman => "Kalman bank",
-            Self::InverseForm => "inverse form",
-            Self::SixPositions => "six positions",
-        }
-    }
 }
 
 impl Default for Options {
@@ -99,7 +72,6 @@ impl Default for Options {
 impl Options {
     /// As the default, but nothing is held out.
     pub const IN_SAMPLE: Self = Self {
-        method: Method::LeastSquares,
         holdout_blocks: 0,
         only: None,
     };
@@ -138,7 +110,7 @@ impl Fit {
             };
         }
         match (self.prepared.manifest.reference, sensor) {
-            (Reference::Table, _) => self.options.method.name(),
+            (Reference::Table, _) => "least squares",
             (Reference::TurntableRate, Sensor::Gyro) => "magnitude of the rate",
             (Reference::Gravity | Reference::TurntableRate, Sensor::Accel) => {
                 "magnitude of specific force"
@@ -247,7 +219,7 @@ fn fit_as_prepared(mut prepared: Prepared, options: Options) -> Result<Fit> {
         .about(Argument::Only));
     }
     let suspicions = suspicions(&prepared)?;
-    reference_error::refuse_unused(&prepared, options.method)?;
+    reference_error::refuse_unused(&prepared)?;
     one_bias(&mut prepared);
     let mut with_all = PerSensor::default();
     if prepared.manifest.reference == Reference::Gravity {

@@ -130,7 +130,7 @@ pub use diagnose::decision::Accepted;
 pub use diagnose::{Diagnosis, Recordings, SensorDiagnosis, Verdict, diagnose};
 pub use effects::effect::Effect;
 pub use effects::fitted::FittedEffect;
-pub use fit::{Fit, Method, Options, Residual, SensorFit, Split, fit, fit_biases};
+pub use fit::{Fit, Options, Residual, SensorFit, Split, fit, fit_biases};
 pub use judgement::{Judgement, JudgementKind};
 pub use mimu_core::PerSensor;
 pub use mimu_core::compensation::Affine;

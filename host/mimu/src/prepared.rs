@@ -187,7 +187,7 @@ impl Prepared {
             return None;
         }
         let observations = self.observations(Sensor::Gyro);
-        let gyro = known_input::least_squares(&observations, None).ok();
+        let gyro = known_input::least_squares(&observations, &[], None).ok();
         let gyro = gyro.map(|g| g.triad.inverse);
         let known_force = self.condensed.has_reference[Sensor::Accel.channels()].contains(&true);
         let accel = match self.is_in_si() {

@@ -237,9 +237,6 @@ pub enum Warning {
         arm_mm: [f64; 3],
         interval_mm: [f64; 3],
     },
-    /// Dwells whose input moves, and the method that uses their means alone.
-    #[error("{} {} an input that moves; {method} uses its mean only, least squares also how the readings follow it", plural(*.dwells, "dwell"), if *.dwells == 1 { "has" } else { "have" })]
-    MeansAlone { dwells: u64, method: &'static str },
     /// The data contradict the prior of the unit's population: the probability that they do, the parameter that has moved most, and by how many standard deviations of the population.
     #[error("the unit is not of the population of the prior ({}: {parameter} {sigmas:+.1} sigmas): the prior is given up for it", p_value(*.p))]
     NotOfPopulation {
@@ -360,9 +357,6 @@ pub enum Warning {
         "the axes are left-handed: one axis of gyro or accelerometer has the wrong sign, or two are exchanged"
     )]
     LeftHanded,
-    /// Rates without an opposite.
-    #[error("{rates} rates have no opposite and are not used by the inverse form")]
-    NoOpposite { rates: usize },
     /// A delay that is not distinguished from a misalignment.
     #[error(
         "a delay of the readings cannot be distinguished from a misalignment and is assumed to be zero: turn in both directions, or at several rates"

@@ -62,7 +62,6 @@ arguments! {
     StepsFound, "--steps found", "Find the dwells, and ignore the step column.";
     StillFactor, "--still", "Largest variance of a dwell.";
     AtRest, "--at-rest", "Whether the unit lies still throughout.";
-    Method, "--method", "The estimator.";
     Only, "--only", "Which of the two sensors is calibrated.";
     Stretch, "--from, --to", "Beginning and end of a time segment.";
     Calibration, "--calibration", "A calibration to convert readings by.";

@@ -5,7 +5,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use mimu::fit::{Fit, Method};
+use mimu::fit::Fit;
 use mimu::quantity::Sensor;
 use mimu::triad::invert;
 use mimu_core::compensation::Affine;
@@ -111,9 +111,9 @@ impl Session {
         found.expect("the session has all nine parts")
     }
 
-    fn fit(&self, turns: bool, method: Method) -> Fit {
+    fn fit(&self, turns: bool) -> Fit {
         let text = inputs(turns.then_some(self.turn_deg));
-        self.with(&text).fit(method).expect("it can be fitted")
+        self.with(&text).fit().expect("it can be fitted")
     }
 
     fn with<'a>(&'a self, inputs: &'a str) -> Foreign<'a> {
@@ -278,23 +278,9 @@ fn forward(fit: &Fit, sensor: Sensor) -> Affine<f64> {
 }
 
 #[test]
-fn the_six_position_method_gives_the_diagonals_of_imucal() {
-    on_both(|session| {
-        let fit = session.fit(false, Method::SixPositions);
-        let (ours, theirs) = (forward(&fit, Sensor::Accel), &session.published.accel);
-        for i in 0..3 {
-            let (s, b) = (ours.matrix[(i, i)], ours.offset[i]);
-            // Both are (u+ - u-)/2g and (u+ + u-)/2 of the same means: equal to the rounding of sums over a thousand samples.
-            assert!((s - theirs.matrix[(i, i)]).abs() < 1e-9 * s, "{s}");
-            assert!((b - theirs.offset[i]).abs() < 1e-9 * s * GRAVITY, "{b}");
-        }
-    });
-}
-
-#[test]
 fn least_squares_on_six_faces_is_imucals_matrix_and_the_mean_of_all_its_biases() {
     on_both(|session| {
-        let fit = session.fit(false, Method::LeastSquares);
+        let fit = session.fit(false);
         let ours = forward(&fit, Sensor::Accel);
         let theirs = &session.published.accel;
         // Six opposite inputs are an orthogonal design, for which least squares uses the same differences as imucal. Only the weights differ: the
@@ -325,7 +311,7 @@ fn least_squares_on_six_faces_is_imucals_matrix_and_the_mean_of_all_its_biases()
 #[test]
 fn turns_give_imucals_gyro_once_its_term_in_specific_force_is_added_back() {
     on_both(|session| {
-        let fit = session.fit(true, Method::LeastSquares);
+        let fit = session.fit(true);
         assert_eq!(fit.prepared.manifest.turn_steps.len(), 3);
         let ours = forward(&fit, Sensor::Gyro);
         let published = &session.published;
@@ -373,7 +359,7 @@ fn moves_between_faces_that_no_fit_has_seen_are_predicted_as_well_as_by_imucal()
     let Some((session, samples)) = uninterrupted() else {
         return;
     };
-    let fit = session.fit(true, Method::LeastSquares);
+    let fit = session.fit(true);
     let data = data_set("imucal_ferraris").expect("it was there");
     let faces = session_parts(&data).into_iter();
     let faces = faces.filter(|(name, _)| !name.ends_with("rot"));
@@ -422,7 +408,7 @@ fn by_hand(columns: &'static str) -> Option<mimu_recording::error::Result<Fit>> 
         scales: &["gyro=0.017453292519943295"],
         inputs: None,
     };
-    Some(foreign.fit(Method::LeastSquares))
+    Some(foreign.fit())
 }
 
 #[test]

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use clap::{Args, ValueEnum};
 use mimu::calibration::Calibration;
 use mimu::data_sheet::DataSheet;
-use mimu::fit::{Fit, Method, Options, fit_or_faces};
+use mimu::fit::{Fit, Options, fit_or_faces};
 use mimu::judgement::Judgement;
 use mimu::noise::noise_file::NoiseFile;
 use mimu::prepared::Prepared;
@@ -19,7 +19,7 @@ use mimu::sessions::{Sessions, fit_determined};
 use mimu::signal::stillness::DwellSearch;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::stage;
-use mimu_recording::{Reference, ReferenceError};
+use mimu_recording::ReferenceError;
 use serde::Serialize;
 
 use crate::arguments::{
@@ -49,9 +49,6 @@ pub struct FitArgs {
     /// Hold out N contiguous blocks in turn, refit without each, and report the error on it
     #[arg(long, value_name = "blocks=N", default_value = "blocks=4", value_parser = holdout)]
     holdout: usize,
-    /// Estimator if the input is known (reference = "table") [default: least-squares]
-    #[arg(long, value_enum)]
-    method: Option<MethodArg>,
     /// Calibrate one sensor only, if the experiment does not determine the other
     #[arg(long, value_enum, value_name = "SENSOR")]
     only: Option<SensorArg>,
@@ -101,19 +98,6 @@ enum ClassArg {
     Tactical,
 }
 
-#[derive(Clone, Copy, ValueEnum)]
-enum MethodArg {
-    /// Forward form, all dwells at once
-    LeastSquares,
-    /// Forward form, bank of Kalman filters
-    Kalman,
-    /// Inverse form, differences of opposite rates
-    #[value(alias = "xu")]
-    InverseForm,
-    /// Scale factors and biases only, from six positions
-    SixPositions,
-}
-
 fn holdout(text: &str) -> std::result::Result<usize, String> {
     let count = text.strip_prefix("blocks=").unwrap_or(text);
     match count.parse() {
@@ -155,12 +139,6 @@ pub(crate) fn run(args: &FitArgs) -> Result<Status> {
 impl FitArgs {
     fn options(&self) -> Options {
         Options {
-            method: match self.method {
-                None | Some(MethodArg::LeastSquares) => Method::LeastSquares,
-                Some(MethodArg::Kalman) => Method::Kalman,
-                Some(MethodArg::InverseForm) => Method::InverseForm,
-                Some(MethodArg::SixPositions) => Method::SixPositions,
-            },
             holdout_blocks: self.holdout,
             only: self.only.map(SensorArg::sensor),
         }
@@ -182,21 +160,10 @@ impl FitArgs {
             None => prepared,
         };
         let prior = self.prior.as_deref().map(Prior::read).transpose()?;
-        let prepared = match prior {
-            Some(prior) => prepared.with_prior(Arc::new(prior))?,
-            None => prepared,
-        };
-        if self.method.is_some() && prepared.manifest.reference != Reference::Table {
-            return Err(Error::new(
-                &prepared.place,
-                format!(
-                    "--method chooses between estimators for known inputs, and reference is \"{}\"",
-                    prepared.manifest.reference
-                ),
-                "leave --method out, or give the dwells their inputs (reference = \"table\")",
-            ));
+        match prior {
+            Some(prior) => prepared.with_prior(Arc::new(prior)),
+            None => Ok(prepared),
         }
-        Ok(prepared)
     }
 
     /// The fit of the recording that `open` reads, without the list of dwells after a refusal.

@@ -1,14 +1,12 @@
 //! The unknown part of the Earth's rate in dwell means: a few numbers that all dwells of one heading share.
 //!
-//! Least squares and the Kalman bank take their covariance. Estimators without weights take the likeliest numbers as part of the inputs, and what
-//! remains unknown of them goes into their covariance.
+//! Least squares takes their covariance. Where parameters are given, the likeliest numbers become part of the inputs.
 
-use nalgebra::{DMatrix, DVector, Matrix3, SVector, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::inputs::{design, span};
-use super::{EarthShare, Estimated, Failure, Observation};
+use super::{EarthShare, Estimated, Observation};
 use crate::observable::Observable;
-use crate::triad::{Covariance, Part, Triad, vector};
 
 /// Places of the numbers of each heading that several observations share.
 fn places(observations: &[Observation]) -> (Vec<Option<usize>>, usize) {
@@ -42,29 +40,10 @@ pub fn factor(
     factor.select_columns(&kept)
 }
 
-/// The sensors' matrix, raw/SI, to about a per cent: without the unknown part of the Earth's rate. Zero if the inputs do not determine it.
-pub(super) fn rough_forward(observations: &[Observation]) -> Matrix3<f64> {
-    if !observations.iter().any(|o| o.earth.is_unknown()) {
-        return Matrix3::zeros();
-    }
-    let span = span(observations);
-    let readings = DMatrix::from_fn(observations.len(), 3, |i, k| observations[i].raw[k]);
-    let solved = design(observations, span).svd(true, true);
-    solved.solve(&readings, 1e-9).map_or_else(
-        |_| Matrix3::zeros(),
-        |by| Matrix3::from_fn(|axis, k| by[(k + 1, axis)] / span),
-    )
-}
-
-fn affine(observations: &[Observation]) -> DMatrix<f64> {
-    design(observations, span(observations))
-}
-
 /// The unknown numbers, in standard deviations: three for each heading that several observations share.
 struct Numbers {
     places: Vec<Option<usize>>,
     value: DVector<f64>,
-    covariance: DMatrix<f64>,
 }
 
 impl Numbers {
@@ -111,11 +90,9 @@ impl Numbers {
             normal += factor.tr_mul(&factor);
             with += factor.tr_mul(&readings).column(0);
         }
-        let cholesky = normal.cholesky()?;
         Some(Self {
             places,
-            value: cholesky.solve(&with),
-            covariance: cholesky.inverse(),
+            value: normal.cholesky()?.solve(&with),
         })
     }
 
@@ -157,7 +134,7 @@ pub(super) fn found(mut estimated: Estimated, observations: &[Observation]) -> E
         let of_axis = scatter.find(|s| s.0 == Observable::Axis(axis));
         of_axis.map_or(0.0, |s| s.1.extra_variance)
     });
-    let design = affine(observations);
+    let design = design(observations, span(observations));
     let numbers = Numbers::of(
         observations,
         &design,
@@ -234,53 +211,6 @@ pub fn likely(observations: &[Observation], forward: &Matrix3<f64>) -> Vec<Obser
     let each = observations.iter();
     each.map(|o| completed(o, &own(o).unwrap_or_else(Vector3::zeros)))
         .collect()
-}
-
-/// An estimate by `estimator`, which takes independent errors only: the likeliest unknown numbers become part of the inputs, and what remains unknown of
-/// them part of the covariance.
-pub fn apart(
-    observations: &[Observation],
-    estimator: impl Fn(&[Observation]) -> Result<Estimated, Failure>,
-) -> Result<Estimated, Failure> {
-    let forward = rough_forward(observations);
-    let design = affine(observations);
-    let Some(numbers) = Numbers::of(observations, &design, &forward, &[0.0; 3]) else {
-        return estimator(observations);
-    };
-    let at = |value: &DVector<f64>| {
-        let with = |o: &Observation| {
-            let place = numbers.places[o.earth.heading];
-            let own = |k: usize| place.map_or(0.0, |from| value[from + k]);
-            let by = forward * o.earth.by;
-            let alone = f64::from(u8::from(place.is_none()));
-            Observation {
-                variance: o.variance
-                    + Vector3::from_fn(|axis, _| alone * by.row(axis).norm_squared()),
-                ..completed(o, &Vector3::new(own(0), own(1), own(2)))
-            }
-        };
-        let all: Vec<Observation> = observations.iter().map(with).collect();
-        estimator(&all)
-    };
-    let mut estimated = at(&numbers.value)?;
-    let parameters = |e: &Estimated| -> SVector<f64, 12> {
-        vector(&e.triad.inverse.matrix, &e.triad.inverse.offset)
-    };
-    let here = parameters(&estimated);
-    let mut by = DMatrix::zeros(12, numbers.value.len());
-    for k in 0..numbers.value.len() {
-        let mut moved = numbers.value.clone();
-        moved[k] += 1.0;
-        by.set_column(k, &(parameters(&at(&moved)?) - here));
-    }
-    let covariance = &by * &numbers.covariance * by.transpose();
-    let covariance = Covariance::from_fn(|i, j| covariance[(i, j)]);
-    let open = Part::known(covariance);
-    let parts = estimated.triad.inverse_parts().into_iter().chain([open]);
-    estimated.triad = Triad::from_inverse(estimated.triad.inverse, parts.collect())
-        .ok_or_else(|| Failure::NoSolution("C is singular".into()))?;
-    estimated.earth = numbers.by_heading();
-    Ok(estimated)
 }
 
 #[cfg(test)]

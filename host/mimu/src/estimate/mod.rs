@@ -2,9 +2,7 @@
 //!
 //! | module            | reference | what it is                                               |
 //! |-------------------|-----------|----------------------------------------------------------|
-//! | [`known_input`]   | table     | forward least squares, Kalman bank, xu's inverse form |
-//! | [`six_positions`] | table     | scale factors and biases from six positions               |
-//! | [`moving_input`]  | table     | the same least squares if inputs move within dwells        |
+//! | [`known_input`]   | table     | forward least squares, also of inputs that move within dwells |
 //! | [`magnitude`]     | gravity, turntable | accelerometer from the magnitude of gravity over many poses; gyro from that of a turntable's rate |
 //! | [`rotation`]      | gravity   | gyro from the turns between dwells                       |
 //! | [`whole_turns`]   | gravity   | the same with turns that end where they began            |
@@ -23,9 +21,7 @@ mod inputs;
 pub mod known_input;
 pub mod least_squares;
 pub mod magnitude;
-pub mod moving_input;
 pub mod rotation;
-pub mod six_positions;
 pub mod whole_turns;
 pub mod with_turns;
 

@@ -8,10 +8,8 @@ use super::hold_out::{Refits, Split, determined};
 use super::predicted::LinearAxis;
 use super::reference_error::{Influence, Influences};
 use super::sensor::{Residual, SensorFit, typical};
-use super::{Method, Options, finish, lever_arm, refuse_wrong_gravity, uncalibrated};
-use crate::estimate::{
-    Estimated, Failure, Observation, earth_shared, known_input, moving_input, six_positions,
-};
+use super::{Options, finish, lever_arm, refuse_wrong_gravity, uncalibrated};
+use crate::estimate::{Estimated, Failure, Observation, known_input};
 use crate::observable::Observable;
 use crate::observation::slope;
 use crate::prepared::{Prepared, si_covariance};
@@ -48,10 +46,7 @@ pub(super) fn fit_known(
                 continue;
             }
             Err(failure) => {
-                let mut error = prepared.refused(failure, sensor);
-                if options.method != Method::LeastSquares {
-                    error = error.about(Argument::Method);
-                }
+                let error = prepared.refused(failure, sensor);
                 let other = Sensor::BOTH.into_iter().find(|s| *s != sensor && wanted(s));
                 return Err(match other {
                     Some(other) => error
@@ -138,13 +133,12 @@ impl<'a> Known<'a> {
     /// Allows for a lever arm, and removes what all axes have in common of it: the sums within dwells are then right too.
     fn free_arm(&mut self) {
         let fitted = |known: &Self| {
-            let found = known_input::least_squares(&known.weighed, known.shared.as_ref());
+            let found = known.estimate(&known.weighed, &[]);
             found.ok().map(|first| first.triad)
         };
         if !self.prepared.noise.is_known(self.sensor) {
             return;
         }
-        let alone = (self.weighed.clone(), self.shared.clone());
         let forward = fitted(self).map(|triad| triad.forward.matrix);
         let lever = forward.and_then(|f| lever_arm::covariance(&self.prepared, &f));
         let Some(lever) = lever else { return };
@@ -154,13 +148,6 @@ impl<'a> Known<'a> {
         if let Some((prepared, place)) = clean {
             self.observations = prepared.observations(self.sensor);
             self.within = prepared.within_dwells(self.sensor);
-            if matches!(
-                self.options.method,
-                Method::InverseForm | Method::SixPositions
-            ) {
-                // They take no shared covariance.
-                (self.weighed, self.shared) = alone;
-            }
             for (wide, o) in self.weighed.iter_mut().zip(&self.observations) {
                 wide.raw = o.raw;
             }
@@ -178,16 +165,10 @@ impl<'a> Known<'a> {
         });
     }
 
-    /// What each error of the reference adds to the covariance, if dwell means alone were used: the filters give the estimate of least squares. The parts of
-    /// `estimated` are separated.
+    /// What each error of the reference adds to the covariance, if dwell means alone were used. The parts of `estimated` are separated.
     fn influences(&self, estimated: &mut Estimated) -> Vec<Influence> {
-        let by_means = match self.options.method {
-            Method::LeastSquares => self.within.is_empty(),
-            Method::Kalman => true,
-            Method::InverseForm | Method::SixPositions => false,
-        };
         match (&self.reference, &self.shared) {
-            (Some(reference), Some(shared)) if by_means => reference
+            (Some(reference), Some(shared)) if self.within.is_empty() => reference
                 .separate(estimated, &self.weighed, shared)
                 .unwrap_or_default(),
             _ => Vec::new(),
@@ -199,19 +180,7 @@ impl<'a> Known<'a> {
         o: &[Observation],
         within: &[Observation],
     ) -> std::result::Result<Estimated, Failure> {
-        let shared = self.shared.as_ref();
-        match (self.options.method, self.sensor) {
-            (Method::LeastSquares, _) if !within.is_empty() => {
-                moving_input::least_squares(o, within, shared)
-            }
-            (Method::LeastSquares, _) => known_input::least_squares(o, shared),
-            (Method::Kalman, _) => known_input::kalman(o, shared),
-            (Method::InverseForm, Sensor::Gyro) => {
-                earth_shared::apart(o, known_input::opposite_rates)
-            }
-            (Method::InverseForm, Sensor::Accel) => known_input::inverse_form(o),
-            (Method::SixPositions, _) => earth_shared::apart(o, six_positions::six_positions),
-        }
+        known_input::least_squares(o, within, self.shared.as_ref())
     }
 
     fn has_one_input(&self) -> bool {
@@ -229,12 +198,6 @@ impl<'a> Known<'a> {
         if self.sensor == Sensor::Gyro && self.observations.iter().any(turn) {
             warnings.push(Warning::ExactTurns);
         }
-        if !self.within.is_empty() && self.options.method != Method::LeastSquares {
-            warnings.push(Warning::MeansAlone {
-                dwells: count_dwells(&self.within),
-                method: self.options.method.name(),
-            });
-        }
         warnings
     }
 
@@ -243,12 +206,8 @@ impl<'a> Known<'a> {
         let influences = self.influences(&mut estimated);
         let (prepared, sensor) = (&self.prepared, self.sensor);
         let means = self.observations.iter().map(|o| (o, 1.0));
-        let within_used = match self.options.method {
-            Method::LeastSquares => &self.within[..],
-            _ => &[],
-        };
         let all: Vec<(&Observation, f64)> =
-            means.chain(within_used.iter().map(|o| (o, 0.0))).collect();
+            means.chain(self.within.iter().map(|o| (o, 0.0))).collect();
         let matrix = estimated.triad.inverse.matrix;
         let floor = |o: &Observation| (si_covariance(&matrix, &o.variance).trace() / 3.0).sqrt();
         let mut residuals: Vec<Residual> = all
@@ -348,20 +307,10 @@ impl Known<'_> {
             _ => all[i].0.input[j - 1] / span,
         });
         let means = known_input::errors(&self.weighed, axis, self.shared.as_ref(), forward);
-        let within = all.len() - self.weighed.len();
-        let of_within = self.within.iter().take(within).map(|o| {
-            let earth = (forward.row(axis) * o.earth.by).norm_squared();
-            o.variance[axis] + earth
-        });
-        let of_within = known_input::positive(DVector::from_iterator(within, of_within));
-        // The inverse form finds it in SI.
-        let unit = match self.options.method {
-            Method::InverseForm => forward[(axis, axis)].powi(2),
-            Method::LeastSquares | Method::Kalman | Method::SixPositions => 1.0,
-        };
+        let of_within = known_input::errors_of_sums(&self.within, axis, forward);
         let extra = |group| {
             let of = estimated.scatter.iter().find(|(g, _)| *g == group);
-            of.map_or(0.0, |(_, s)| s.extra_variance * unit)
+            of.map_or(0.0, |(_, s)| s.extra_variance)
         };
         let groups = [Observable::Axis(axis), Observable::Within(axis)].map(extra);
         LinearAxis {
@@ -372,11 +321,4 @@ impl Known<'_> {
             }),
         }
     }
-}
-
-/// Dwells of `observations`, in order.
-fn count_dwells(observations: &[Observation]) -> u64 {
-    let mut dwells: Vec<usize> = observations.iter().map(|o| o.dwell).collect();
-    dwells.dedup();
-    dwells.len() as u64
 }

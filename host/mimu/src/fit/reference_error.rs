@@ -7,7 +7,6 @@
 use nalgebra::{DMatrix, Matrix3, SVector, Vector3};
 use serde::Serialize;
 
-use super::Method;
 use crate::estimate::{Estimated, Observation, known_input};
 use crate::prepared::Prepared;
 use crate::quantity::Sensor;
@@ -222,31 +221,25 @@ impl Influences {
     }
 }
 
-/// Refuses errors of the reference that a fit by `method` cannot count, instead of making intervals that lack them.
+/// Refuses errors of the reference that a fit cannot count, instead of making intervals that lack them.
 ///
 /// # Errors
 /// The keys that do not apply, and why.
-pub(super) fn refuse_unused(prepared: &Prepared, method: Method) -> Result<()> {
+pub(super) fn refuse_unused(prepared: &Prepared) -> Result<()> {
     let Some(stated) = &prepared.reference_error else {
         return Ok(());
     };
-    let (why, applies): (&str, fn(&str) -> bool) = match (prepared.manifest.reference, method) {
-        (Reference::Table, Method::LeastSquares | Method::Kalman) => return Ok(()),
-        (Reference::Table, Method::InverseForm | Method::SixPositions) => (
-            "this estimator weighs dwells by noise alone; use least-squares or kalman",
-            |_| false,
-        ),
-        (Reference::Gravity, _) => (
-            "by hand neither a pose nor a rate is taken as known: only gravity_mps2 applies",
-            |key| key == "gravity_mps2",
-        ),
-        (Reference::TurntableRate, _) => (
-            "on a turntable only the magnitude of the rate is known, and [turntable] states its rate_error: only gravity_mps2 applies",
-            |key| key == "gravity_mps2",
-        ),
+    let why = match prepared.manifest.reference {
+        Reference::Table => return Ok(()),
+        Reference::Gravity => {
+            "by hand neither a pose nor a rate is taken as known: only gravity_mps2 applies"
+        }
+        Reference::TurntableRate => {
+            "on a turntable only the magnitude of the rate is known, and [turntable] states its rate_error: only gravity_mps2 applies"
+        }
     };
-    let keys: Vec<&str> = stated.stated().map(|(key, ..)| key).collect();
-    let unused: Vec<&str> = keys.into_iter().filter(|key| !applies(key)).collect();
+    let keys = stated.stated().map(|(key, ..)| key);
+    let unused: Vec<&str> = keys.filter(|key| *key != "gravity_mps2").collect();
     match unused.is_empty() {
         true => Ok(()),
         false => Err(Error::new(

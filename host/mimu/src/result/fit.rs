@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::TOOL;
 use super::budget::{BudgetRow, budget};
 use crate::fit::change::Change;
-use crate::fit::{Fit, Method, SensorFit, Split};
+use crate::fit::{Fit, SensorFit, Split};
 use crate::judgement::Judgement;
 use crate::observable::Observable;
 use crate::parameter::{ParameterKind, TriadParameter, parameters};
@@ -43,8 +43,6 @@ pub struct FitResult {
     /// How fast the clock of the samples runs, if it was compared with a better one; absent otherwise.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub clock: Option<ClockRate>,
-    /// Estimator where the input is known.
-    pub method: &'static str,
     /// Whether it was a table of means, one row for each pose, instead of samples.
     pub means: bool,
     /// Samples, or rows of the table of means.
@@ -272,7 +270,6 @@ impl FitResult {
             raw_unit: manifest.raw_unit,
             gravity_mps2: manifest.gravity_mps2,
             clock: manifest.clock,
-            method: fit.options.method.name(),
             means: manifest.means,
             rows: condensed.rows,
             period_s: condensed.period_s,
@@ -428,8 +425,6 @@ fn extra_sigma_unit(fit: &Fit, found: &SensorFit, group: Observable) -> String {
         Figure::Direction | Figure::GravityMagnitude | Figure::RateMagnitude => {
             found.figure.unit(found.sensor).into()
         }
-        // Axes of the forward form are in raw units, of the inverse form in SI.
-        Figure::Input if fit.options.method == Method::InverseForm => si.into(),
         Figure::Input => raw_unit(fit.prepared.manifest.raw_unit, si),
     }
 }

@@ -238,16 +238,12 @@ fn on_table(cases: &mut Cases) {
             move |bench| {
                 twice(bench, &rig::table_plan(Some(seed)), &clean(seed), seed);
                 judged(bench, "");
-                for method in ["kalman", "inverse-form", "six-positions"] {
-                    bench.mimu(&format!("fit a --method {method}"));
-                }
             },
         );
     }
     cases.add("table", "moving inputs", |bench| {
         twice(bench, &rig::turning_plan(5), &clean(5), 5);
         judged(bench, "");
-        bench.mimu("fit a --method kalman");
     });
     cases.add("table", "lever arm", |bench| {
         twice(
@@ -271,7 +267,6 @@ fn on_table(cases: &mut Cases) {
              gravity_mps2 = 1e-3\nlevel_deg = 0.01\n",
         );
         bench.mimu("fit a").mimu("fit a --reference-error reference.toml -o cal.toml");
-        bench.mimu("fit b --reference-error reference.toml --method kalman");
         bench.mimu("verify b --calibration cal.toml");
     });
     cases.add("table", "noise at rest", |bench| {
@@ -310,7 +305,7 @@ fn on_table(cases: &mut Cases) {
                  --inputs inputs.csv -o {name}-faces"
             ));
         }
-        bench.mimu("fit a-faces -o cal.toml").mimu("fit a-faces --method six-positions");
+        bench.mimu("fit a-faces -o cal.toml");
         bench.mimu("verify b-faces --calibration cal.toml").mimu("diagnose a-faces");
     });
 }
@@ -759,8 +754,5 @@ fn ferraris(bench: &Bench, session: &real_ferraris::Session) {
     let folder = tempfile::tempdir().expect("a folder");
     session.import(&folder);
     bench.take("a", &folder.path().join("recording"));
-    bench
-        .mimu("fit a")
-        .mimu("fit a --method six-positions --only accel")
-        .mimu("diagnose a");
+    bench.mimu("fit a").mimu("diagnose a");
 }

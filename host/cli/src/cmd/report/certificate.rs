@@ -6,7 +6,7 @@ use clap::Args;
 use mimu::calibration::Calibration;
 use mimu::certificate::{AsFound, Certificate, Particulars};
 use mimu::data_sheet::{DataSheet, Part};
-use mimu::fit::{Fit, Method, Options, fit};
+use mimu::fit::{Fit, Options, fit};
 use mimu::noise::noise_file::NoiseFile;
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
@@ -63,13 +63,9 @@ impl CertificateArgs {
         let stated = prepared.reference_error();
         let traceable = stated.is_some_and(|e| !e.traceability.trim().is_empty());
         let particulars = Particulars::read(particulars, traceable, today)?;
-        let options = Options {
-            method: Method::LeastSquares,
-            holdout_blocks: 4,
-            only: None,
-        };
         let problems = OfRecording::prepared(&prepared);
-        let fitted = fit(prepared, options).inspect_err(|_| refused(&problems, false))?;
+        let fitted =
+            fit(prepared, Options::default()).inspect_err(|_| refused(&problems, false))?;
         let made = Calibration::of(&fitted, &[], &now)?;
         if let Some(file) = given.calibration {
             refuse_other(&Calibration::read(file)?, &made, file)?;

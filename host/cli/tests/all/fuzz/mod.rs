@@ -21,7 +21,7 @@ use std::time::{Duration, Instant};
 
 use mimu::calibration::Calibration;
 use mimu::calibration::verify::verify;
-use mimu::fit::{Fit, Method, Options, fit};
+use mimu::fit::{Fit, Options, fit};
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
 use mimu::result::fit::FitResult;
@@ -153,14 +153,7 @@ const INPUTS: &str = "step,ref_force_x_mps2,ref_force_y_mps2,ref_force_z_mps2,tu
                       0,0,0,9.81,0,0,0\n1,0,9.81,0,90,0,0\n2,9.81,0,0,,1.5,0\n3,0,0,-9.81,-360,0,0\n";
 
 fn options(random: &mut Random) -> Options {
-    let methods = [
-        Method::LeastSquares,
-        Method::Kalman,
-        Method::InverseForm,
-        Method::SixPositions,
-    ];
     Options {
-        method: methods[if random.one_in(2) { 0 } else { random.below(4) }],
         holdout_blocks: [0, 2, 4, 1000][random.below(4)],
         only: [None, None, Some(Sensor::Gyro), Some(Sensor::Accel)][random.below(4)],
     }
@@ -195,11 +188,6 @@ impl Seeds {
             (by_table.clone(), "table"),
             (without_steps(&by_table), "table"),
         ];
-        let options = Options {
-            method: Method::LeastSquares,
-            holdout_blocks: 4,
-            only: None,
-        };
         let mut calibration = String::new();
         let mut parquet = Vec::new();
         for (text, reference) in &csv {
@@ -209,7 +197,7 @@ impl Seeds {
                 "samples.csv",
                 text.as_bytes(),
             );
-            let fitted = fit_recording(&folder.join("seed"), STILL_FACTOR, options)
+            let fitted = fit_recording(&folder.join("seed"), STILL_FACTOR, Options::default())
                 .expect("the seeds are valid");
             calibration = Calibration::of(&fitted, &[], "2026-01-01T00:00:00Z")
                 .unwrap()

@@ -100,7 +100,7 @@ fn the_estimators_claim_the_sigmas_that_the_design_promised() {
         })
         .collect();
     // Columns of C or P by rows, then o or b: known_input gives P and b; magnitude gives C and o.
-    let known = known_input::least_squares(&observations, None)
+    let known = known_input::least_squares(&observations, &[], None)
         .unwrap()
         .triad
         .forward_covariance;
