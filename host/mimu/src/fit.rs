@@ -2,14 +2,14 @@
 
 mod biases;
 mod by_gravity;
-pub(crate) mod by_rate;
+mod by_rate;
 pub mod change;
 mod determined;
 mod earth;
 mod hold_out;
+mod judged;
 mod known;
 pub(crate) mod lever_arm;
-mod magnitudes;
 mod reference_error;
 pub use reference_error::{Cause, Influence};
 mod of_temperature;
@@ -17,7 +17,7 @@ mod off_level;
 mod outlying;
 mod partly;
 pub mod plausible;
-pub(crate) mod predicted;
+mod predicted;
 mod sensor;
 pub mod session_bias;
 pub(crate) mod uncalibrated;
@@ -25,7 +25,7 @@ pub(crate) mod uncalibrated;
 use std::sync::Arc;
 
 use crate::estimate::least_squares::{POORLY_DETERMINED, Scatter};
-use crate::estimate::{Estimated, Observation, magnitude};
+use crate::estimate::{Estimated, Failure, Observation, magnitude};
 use crate::prepared::Prepared;
 use crate::prior::{FALSE_STRANGER, Prior};
 use crate::quantity::{Figure, Sensor};
@@ -43,6 +43,7 @@ use crate::observable::Observable;
 use by_gravity::{fit_gravity, with_priors};
 use by_rate::fit_rates;
 pub(crate) use determined::faces_not_up;
+use judged::Judged;
 use known::fit_known;
 use outlying::Outlying;
 
@@ -367,15 +368,16 @@ fn without_temperature(prepared: &Prepared) -> Option<Warning> {
 /// Fewer degrees of freedom than this do not reveal errors of the model.
 const FEW_DOF: f64 = 3.0;
 
-fn finish(
-    sensor: Sensor,
-    estimated: Estimated,
-    figure: Figure,
-    residuals: Vec<Residual>,
-    dwells: usize,
-    static_rms: Option<(f64, Option<f64>)>,
-    (held_out, unseen): (HoldOut, &[Unseen]),
-) -> SensorFit {
+fn finish(sensor: Sensor, estimated: Estimated, judged: Judged) -> SensorFit {
+    let Judged {
+        figure,
+        residuals,
+        dwells,
+        static_rms,
+        held_out,
+        unseen,
+        uncalibrated_rms,
+    } = judged;
     let mut warnings = estimated.notes.clone();
     // Means of dwells and sums within dwells determine an axis together.
     let axis = |group: Observable| match group {
@@ -404,7 +406,7 @@ fn finish(
         warnings.push(Warning::LeftHanded);
     }
     warnings.extend(held_out.reasons.iter().cloned());
-    let test = tested(&estimated, figure, &residuals, unseen);
+    let test = tested(&estimated, figure, &residuals, &unseen);
     let warnings = warnings.into_iter().map(|w| w.of(sensor)).collect();
     SensorFit {
         sensor,
@@ -415,25 +417,18 @@ fn finish(
         static_rms,
         held_out,
         test,
-        uncalibrated_rms: None,
+        uncalibrated_rms,
         influences: Vec::new(),
         warnings,
     }
 }
 
-/// Rows of a dwell or a turn, and the groups of observations that a figure describes.
-fn described(figure: Figure) -> (f64, fn(Observable) -> bool) {
+/// Whether a figure describes this group of observations.
+fn describes(figure: Figure, group: Observable) -> bool {
     match figure {
-        Figure::Input => (3.0, |group| {
-            matches!(group, Observable::Axis(_) | Observable::Within(_))
-        }),
-        Figure::GravityMagnitude | Figure::RateMagnitude => {
-            (1.0, |group| group == Observable::Magnitude)
-        }
-        // A direction has two angles.
-        Figure::Direction => (2.0, |group| {
-            matches!(group, Observable::Turns | Observable::AfterWholeTurns)
-        }),
+        Figure::Input => matches!(group, Observable::Axis(_) | Observable::Within(_)),
+        Figure::GravityMagnitude | Figure::RateMagnitude => group == Observable::Magnitude,
+        Figure::Direction => matches!(group, Observable::Turns | Observable::AfterWholeTurns),
     }
 }
 
@@ -447,13 +442,10 @@ fn tested(
     if residuals.iter().any(|r| r.floor.is_nan()) {
         return None;
     }
-    let (each, is_described) = described(figure);
-    let groups = estimated
-        .scatter
-        .iter()
-        .filter(|(group, _)| is_described(*group));
+    let all = estimated.scatter.iter();
+    let groups = all.filter(|(group, _)| describes(figure, *group));
     let sum = |of: fn(&Scatter) -> f64| groups.clone().map(|(_, s)| of(s)).sum::<f64>();
-    let rows = each * residuals.len() as f64;
+    let rows = (figure.components() * residuals.len()) as f64;
     match unseen.is_empty() {
         false => Test::of(unseen, (sum(|s| s.dof), rows), 0.0),
         true => {
@@ -464,6 +456,12 @@ fn tested(
             Test::of_scatter(&all, rows)
         }
     }
+}
+
+/// The error for a fit whose data cannot judge it.
+fn lost(prepared: &Prepared, sensor: Sensor) -> Error {
+    let seen = "the fit does not give back what it was fitted to".to_string();
+    prepared.refused(Failure::NoSolution(seen), sensor)
 }
 
 /// Refuses an accelerometer in g: known forces near 1, or readings in SI near 1 at rest.

@@ -81,6 +81,7 @@ pub mod in_use;
 pub mod judge;
 #[doc(hidden)]
 pub mod judgement;
+mod judging;
 #[doc(hidden)]
 pub mod noise;
 #[doc(hidden)]

@@ -513,23 +513,16 @@ impl Prepared {
         self.magnitude_noise(accel, poses).0
     }
 
-    /// The magnitudes of gravity in all poses, with their noise by `accel`.
-    pub(crate) fn magnitudes(&self, accel: &Affine<f64>) -> Factors<'_> {
+    /// The magnitudes of gravity in all poses, with their noise by `accel`, and whether that is known.
+    pub(crate) fn magnitudes(&self, accel: &Affine<f64>) -> (Factors<'static>, bool) {
         let poses = self.observations(Sensor::Accel);
-        let variances = self.magnitude_variances(accel, &poses);
+        let (variances, is_known) = self.magnitude_noise(accel, &poses);
         let mut factors = Factors::default();
         for (o, variance) in poses.iter().zip(variances) {
             let known = (self.manifest.gravity_mps2, None);
             factors.magnitude(Sensor::Accel, (o.dwell, o.raw), known, variance);
         }
-        factors
-    }
-
-    /// Standard deviations of the same, for people; not a number if the noise is unknown.
-    pub fn magnitude_floors(&self, accel: &Affine<f64>, poses: &[Observation]) -> Vec<f64> {
-        let (variances, known) = self.magnitude_noise(accel, poses);
-        let floor = |v: &f64| if known { v.sqrt() } else { f64::NAN };
-        variances.iter().map(floor).collect()
+        (factors, is_known)
     }
 
     /// `floor`, a figure from the noise of `sensors`; not a number if that is unknown.

@@ -50,6 +50,15 @@ impl Figure {
         matches!(self, Self::GravityMagnitude | Self::RateMagnitude)
     }
 
+    /// Number of components of the error of a dwell or a turn: a direction has two angles.
+    pub fn components(self) -> usize {
+        match self {
+            Self::Input => 3,
+            Self::GravityMagnitude | Self::RateMagnitude => 1,
+            Self::Direction => 2,
+        }
+    }
+
     /// The quantity, as a sentence fragment.
     pub fn description(self) -> &'static str {
         match self {

@@ -3,12 +3,14 @@
 //! The manifest gives the rates of the steps that a person named. The readings show those of the others: at rest they are the bias, and at
 //! a rate their distance from the bias is the rate times a scale factor, which is about the same for all axes.
 
+use mimu_core::compensation::Affine;
 use nalgebra::Vector3;
 
 use crate::estimate::earth;
 use crate::estimate::{Observation, magnitude};
+use crate::factor::Factors;
 use crate::observation::turn::Rest;
-use crate::prepared::Prepared;
+use crate::prepared::{Prepared, si_covariance};
 use crate::quantity::{Sensor, significant};
 use crate::signal::dwell::Fault;
 use crate::warning::Warning;
@@ -153,6 +155,16 @@ impl RatedDwells {
         })
     }
 
+    /// The magnitudes of the turning dwells, with their noise by the `gyro`.
+    pub(crate) fn factors(&self, gyro: &Affine<f64>) -> Factors<'static> {
+        let mut factors = Factors::default();
+        let known = self.turning.iter().zip(self.magnitudes());
+        for ((o, rate), variance) in known.zip(variances(gyro, &self.turning)) {
+            factors.magnitude(Sensor::Gyro, (o.dwell, o.raw), (rate, None), variance);
+        }
+        factors
+    }
+
     /// Rate of each of the turning dwells, rad/s.
     pub fn magnitudes(&self) -> impl Iterator<Item = f64> {
         self.rate_of.iter().map(|r| self.rates[*r])
@@ -209,6 +221,15 @@ impl RatedDwells {
         )
         .about(Argument::TurntableRates))
     }
+}
+
+/// Variances of the compensated magnitudes by noise, (rad/s)²; zero if the noise is unknown.
+pub(crate) fn variances(inverse: &Affine<f64>, observations: &[Observation]) -> Vec<f64> {
+    let along = |o: &Observation| {
+        let up = inverse.apply(&o.raw).normalize();
+        up.dot(&(si_covariance(&inverse.matrix, &o.variance) * up))
+    };
+    observations.iter().map(along).collect()
 }
 
 /// Rate of each observation, deg/s, where the manifest gives it by its step.

@@ -19,14 +19,12 @@ use self::power_ons::{Taken, with_one_bias};
 use crate::calibration::Calibration;
 use crate::calibration::die_temperature::{at_one_temperature, outside};
 use crate::effects::removal::{removable, remove_within};
-use crate::estimate::{Observation, earth_shared};
-use crate::fit::by_rate::variances;
 use crate::fit::lever_arm::without_arm;
 use crate::fit::refuse_wrong_gravity;
-use crate::fit::uncalibrated::{errors, exceeds};
+use crate::fit::uncalibrated::exceeds;
 use crate::judgement::Judgement;
-use crate::observation::turn::{Turn, TurnError};
-use crate::prepared::{Prepared, si_covariance};
+use crate::judging::{Judging, Models};
+use crate::prepared::Prepared;
 use crate::quantity::Figure;
 use crate::quantity::{PerSensor, Sensor, present};
 use crate::signal::unit_in_si::restless;
@@ -341,7 +339,7 @@ fn worse_than_without(s: &SensorVerification) -> Option<Warning> {
         return None;
     }
     let readings_in_si = s.rms_uncalibrated.is_some();
-    Some(match exceeds(s.rms, other, errors(s.figure, s.count)) {
+    Some(match exceeds(s.rms, other, s.figure, s.count) {
         true => Warning::Worse { readings_in_si },
         false => Warning::Undecided {
             errors: s.count as u64,
@@ -400,28 +398,19 @@ fn judge(
     sensor: Sensor,
     (power_on, taken): (PowerOn, &Taken),
 ) -> Option<(SensorVerification, Vec<Warning>)> {
-    let inverse = calibration.inverse(sensor)?;
-    let mut warnings = Vec::new();
-    let judged = match (prepared.manifest.reference, sensor) {
-        (Reference::Table, _) => known(prepared, sensor, &inverse),
-        (Reference::Gravity | Reference::TurntableRate, Sensor::Accel) => size(prepared, &inverse),
-        (Reference::TurntableRate, Sensor::Gyro) => rate(prepared, &inverse),
-        // Means of poses do not show how the unit turned between them.
-        (Reference::Gravity, Sensor::Gyro) if prepared.manifest.means => None,
-        (Reference::Gravity, Sensor::Gyro) => {
-            let delivered = || prepared.whole_turns().map(|_| Affine::identity());
-            let accel = calibration.inverse(Sensor::Accel).or_else(delivered)?;
-            turns(prepared, &inverse, &accel, &mut warnings)
-        }
-    };
-    let judged = judged?;
-    let accel = calibration.inverse(Sensor::Accel);
-    let causes = causes::of(prepared, sensor, &inverse, accel.as_ref());
-    let announced = |of| causes::announced(prepared, sensor, calibration, of);
+    let mut models = PerSensor::from_fn(|s| calibration.inverse(s));
+    models[sensor]?;
+    // Whole turns judge a gyro by the accelerometer's readings as delivered, too.
+    let delivered = || prepared.whole_turns().map(|_| Affine::identity());
+    models.accel = models.accel.or_else(delivered);
+    let judging = Judging::of(prepared, sensor, &models)?;
+    let judged = figures(prepared, &judging, &models)?;
+    let causes = causes::of(prepared, &judging, calibration);
+    let announced = |of| causes::announced(prepared, &judging, calibration, of);
     let judged = SensorVerification {
         test: judged::test(
             prepared,
-            sensor,
+            &judging,
             calibration,
             (power_on, taken.dof, causes.as_ref()),
         ),
@@ -431,7 +420,7 @@ fn judge(
         next_power_on: announced(&|s| calibration.next_power_on(s)),
         ..judged
     };
-    Some((judged, warnings))
+    Some((judged, judging.refused))
 }
 
 /// The calibration of a unit whose sensors are all alike and perfectly mounted: every sensor with the mean scale factor
@@ -457,175 +446,34 @@ pub fn nominal(calibrated: &Affine<f64>) -> Option<Affine<f64>> {
     })
 }
 
-fn rms(values: &[f64]) -> f64 {
-    (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt()
-}
-
-fn largest(values: &[f64]) -> f64 {
-    values.iter().map(|v| v.abs()).fold(0.0, f64::max)
-}
-
-/// The figures of the errors without (`raw`) and with (`after`) the calibration; `None` if there are none. `floor` has one value for each dwell or
-/// turn.
-fn judged(
-    sensor: Sensor,
-    figure: Figure,
-    raw: &[f64],
-    after: &[f64],
-    floor: &[f64],
-) -> Option<SensorVerification> {
-    (!after.is_empty()).then(|| SensorVerification {
+/// The figures of the errors by `models` and without them.
+fn figures(prepared: &Prepared, judging: &Judging, models: &Models) -> Option<SensorVerification> {
+    let (sensor, figure) = (judging.sensor, judging.figure);
+    let errors = judging.errors(models)?;
+    let rms = |models: &Models| Some(judging.rms(&judging.errors(models)?));
+    let nominal = models.map(|model| nominal(&model?));
+    let one = PerSensor::both(Some(Affine::identity()));
+    let largest = errors.iter().map(|error| match figure {
+        Figure::Input => error.amax(),
+        _ => error.norm(),
+    });
+    let floors = judging.floors(models)?;
+    let squares: f64 = floors.iter().map(|floor| floor * floor).sum();
+    Some(SensorVerification {
         unit: figure.unit(sensor),
         figure,
-        rms_raw: rms(raw),
-        rms_uncalibrated: None,
+        rms_raw: rms(&nominal)?,
+        rms_uncalibrated: prepared.is_in_si().then(|| rms(&one)).flatten(),
         rms_affine: None,
-        rms: rms(after),
-        max: largest(after),
-        noise_floor: rms(floor),
+        rms: judging.rms(&errors),
+        max: largest.fold(0.0, f64::max),
+        noise_floor: (squares / floors.len() as f64).sqrt(),
         parameter_uncertainty: None,
         next_power_on: None,
         test: None,
-        static_rms: None,
+        static_rms: models.gyro.and_then(|gyro| judging.at_rest(&gyro)),
         causes: None,
         bias_moved: Vec::new(),
-        count: floor.len(),
-    })
-}
-
-fn known(
-    prepared: &Prepared,
-    sensor: Sensor,
-    calibrated: &Affine<f64>,
-) -> Option<SensorVerification> {
-    let forward = Forward::of(calibrated)?;
-    let observations = earth_shared::likely(&prepared.observations(sensor), &forward.matrix);
-    let errors = |model: &Affine<f64>| -> Vec<f64> {
-        observations
-            .iter()
-            .flat_map(|o| <[f64; 3]>::from(model.apply(&o.raw) - o.input))
-            .collect()
-    };
-    let floor: Vec<f64> = observations
-        .iter()
-        .map(|o| (si_covariance(&calibrated.matrix, &o.variance).trace() / 3.0).sqrt())
-        .map(|floor| prepared.if_noise_known(&[sensor], floor))
-        .collect();
-    let after = errors(calibrated);
-    let judged = judged(
-        sensor,
-        Figure::Input,
-        &errors(&nominal(calibrated)?),
-        &after,
-        &floor,
-    )?;
-    Some(SensorVerification {
-        rms_uncalibrated: prepared
-            .is_in_si()
-            .then(|| rms(&errors(&Affine::identity()))),
-        ..judged
-    })
-}
-
-fn size(prepared: &Prepared, calibrated: &Affine<f64>) -> Option<SensorVerification> {
-    let g = prepared.manifest.gravity_mps2;
-    let observations = prepared.observations(Sensor::Accel);
-    let floor = prepared.magnitude_floors(calibrated, &observations);
-    let known: Vec<(&Observation, f64)> = observations.iter().map(|o| (o, g)).collect();
-    magnitudes(
-        prepared,
-        Figure::GravityMagnitude,
-        calibrated,
-        &known,
-        &floor,
-    )
-}
-
-fn rate(prepared: &Prepared, calibrated: &Affine<f64>) -> Option<SensorVerification> {
-    let dwells = RatedDwells::of(prepared).ok()?;
-    let floor = variances(calibrated, &dwells.turning).into_iter();
-    let floor: Vec<f64> = floor
-        .map(|v| prepared.if_noise_known(&[Sensor::Gyro], v.sqrt()))
-        .collect();
-    let known: Vec<(&Observation, f64)> = dwells.turning.iter().zip(dwells.magnitudes()).collect();
-    let judged = magnitudes(prepared, Figure::RateMagnitude, calibrated, &known, &floor)?;
-    let rests = dwells.rests.iter();
-    let rest: Vec<f64> = rests
-        .flat_map(|r| <[f64; 3]>::from(calibrated.apply(&r.raw)))
-        .collect();
-    Some(SensorVerification {
-        static_rms: (!rest.is_empty()).then(|| rms(&rest)),
-        ..judged
-    })
-}
-
-/// The figures by the known magnitudes of the inputs.
-fn magnitudes(
-    prepared: &Prepared,
-    figure: Figure,
-    calibrated: &Affine<f64>,
-    known: &[(&Observation, f64)],
-    floor: &[f64],
-) -> Option<SensorVerification> {
-    let sensor = match figure {
-        Figure::RateMagnitude => Sensor::Gyro,
-        _ => Sensor::Accel,
-    };
-    let errors = |model: &Affine<f64>| -> Vec<f64> {
-        let errors = known
-            .iter()
-            .map(|(o, size)| model.apply(&o.raw).norm() - size);
-        errors.collect()
-    };
-    let judged = judged(
-        sensor,
-        figure,
-        &errors(&nominal(calibrated)?),
-        &errors(calibrated),
-        floor,
-    )?;
-    Some(SensorVerification {
-        rms_uncalibrated: prepared
-            .is_in_si()
-            .then(|| rms(&errors(&Affine::identity()))),
-        ..judged
-    })
-}
-
-fn turns(
-    prepared: &Prepared,
-    gyro: &Affine<f64>,
-    accel: &Affine<f64>,
-    warnings: &mut Vec<Warning>,
-) -> Option<SensorVerification> {
-    let (by_calibration, refused) = prepared.turns(accel);
-    warnings.extend(refused);
-    let (by_nominal, _) = prepared.turns(&nominal(accel)?);
-    let errors = |turns: &[Turn], model: &Affine<f64>| -> Vec<f64> {
-        turns
-            .iter()
-            .map(|t| TurnError::at(t, model).vector().norm())
-            .collect()
-    };
-    let c2 = gyro.matrix.norm_squared() / 3.0;
-    let floor = by_calibration
-        .iter()
-        .map(|t| prepared.if_noise_known(&Sensor::BOTH, t.floor(c2)));
-    let floor: Vec<f64> = floor.collect();
-    let after = errors(&by_calibration, gyro);
-    let rest: Vec<f64> = prepared
-        .rest(accel)
-        .iter()
-        .flat_map(|o| <[f64; 3]>::from(gyro.apply(&o.raw) - o.rate))
-        .collect();
-    let before = errors(&by_nominal, &nominal(gyro)?);
-    let judged = judged(Sensor::Gyro, Figure::Direction, &before, &after, &floor)?;
-    Some(SensorVerification {
-        static_rms: Some(rms(&rest)),
-        rms_uncalibrated: prepared.is_in_si().then(|| {
-            let one = Affine::identity();
-            rms(&errors(&prepared.turns(&one).0, &one))
-        }),
-        ..judged
+        count: errors.len(),
     })
 }

@@ -10,7 +10,9 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use mimu_core::compensation::Affine;
-use nalgebra::{DMatrix, DVector, Dim, Matrix, Matrix3x2, RawStorage, SMatrix, U12, Vector3};
+use nalgebra::{
+    DMatrix, DVector, Dim, Matrix, Matrix3, Matrix3x2, RawStorage, SMatrix, U12, Vector3,
+};
 
 use crate::observable::Observable;
 use crate::observation::closure::{Closure, ClosureError, Closures};
@@ -137,8 +139,21 @@ pub enum Kind<'a> {
         /// Variance by noise, SI squared.
         variance: f64,
     },
-    /// The rate of a gyro at rest, and its chain.
-    Rest(Rest, Option<usize>),
+    /// The input of a triad: of a table, or the rate of a gyro at rest.
+    Input {
+        /// The triad.
+        sensor: Sensor,
+        /// Its mean reading.
+        raw: Vector3<f64>,
+        /// The input, SI.
+        known: Vector3<f64>,
+        /// Variances of the reading by noise, raw units squared.
+        noise: Vector3<f64>,
+        /// Variances of the input, SI squared.
+        variance: Vector3<f64>,
+        /// The chain of a dwell at rest.
+        chain: Option<usize>,
+    },
     /// The direction of gravity after a turn, by its number, and its chain.
     Turn(usize, Option<usize>),
     /// The heading after whole turns, which are neighbours, and the variance without the noise of the gyro, rad².
@@ -166,7 +181,7 @@ impl Factor<'_> {
         match &self.kind {
             Kind::Magnitude { .. } | Kind::Closure(..) => 1,
             Kind::Turn(..) => 2,
-            Kind::Rest(..) => 3,
+            Kind::Input { .. } => 3,
             Kind::Stated(_, _, sums, _) => sums.nrows(),
             Kind::Population(_, prior) => prior.rows(),
         }
@@ -174,7 +189,7 @@ impl Factor<'_> {
 }
 
 /// A list of factors, with the turns that they refer to.
-#[derive(Default)]
+#[derive(Default, Clone)]
 pub struct Factors<'a> {
     /// The factors, those of a group together.
     pub list: Vec<Factor<'a>>,
@@ -238,6 +253,28 @@ impl<'a> Factors<'a> {
         self.push(kind, Observable::Magnitude, [dwell; 2]);
     }
 
+    /// Adds the known input of a triad in a dwell, with the variances of its reading, raw units squared.
+    pub fn input(
+        &mut self,
+        sensor: Sensor,
+        (dwell, raw): (usize, Vector3<f64>),
+        known: Vector3<f64>,
+        noise: Vector3<f64>,
+    ) {
+        self.list.push(Factor {
+            kind: Kind::Input {
+                sensor,
+                raw,
+                known,
+                noise,
+                variance: Vector3::zeros(),
+                chain: None,
+            },
+            group: None,
+            dwells: Some([dwell; 2]),
+        });
+    }
+
     /// Adds the directions after those of the turns that are `of` this group.
     pub fn directions(&mut self, group: Observable, of: impl Fn(usize) -> bool) {
         for t in (0..self.turns.len()).filter(|t| of(*t)) {
@@ -263,11 +300,20 @@ impl<'a> Factors<'a> {
         let chains = self.chains.of_rest.clone();
         let chains = chains.into_iter().chain(std::iter::repeat(None));
         for (rest, chain) in rest.iter().zip(chains) {
-            let mut own = *rest;
-            if chain.is_some() {
-                own.rate_variance.fill(0.0);
-            }
-            self.push(Kind::Rest(own, chain), Observable::Rest, [rest.dwell; 2]);
+            // Within a chain the level part of the rate is a parameter.
+            let level = match chain {
+                Some(_) => Vector3::zeros(),
+                None => rest.rate_variance,
+            };
+            let kind = Kind::Input {
+                sensor: Sensor::Gyro,
+                raw: rest.raw,
+                known: rest.rate,
+                noise: rest.variance,
+                variance: level + rest.vertical_variance,
+                chain,
+            };
+            self.push(kind, Observable::Rest, [rest.dwell; 2]);
         }
     }
 
@@ -340,16 +386,19 @@ impl<'a> Factors<'a> {
 
     /// Known variances of the residuals.
     pub fn variances(&self, values: &Values) -> Vec<f64> {
-        let c = values.triad(Sensor::Gyro).map(|gyro| gyro.matrix);
-        let squared = c.map_or_else(Default::default, |c| c.component_mul(&c));
-        let mean = squared.sum() / 3.0;
+        let squared = PerSensor::from_fn(|sensor| {
+            let c = values.triad(sensor).map(|triad| triad.matrix);
+            c.map_or_else(Matrix3::zeros, |c| c.component_mul(&c))
+        });
+        let mean = squared.gyro.sum() / 3.0;
         let each = self.list.iter().flat_map(|factor| match &factor.kind {
             Kind::Magnitude { variance, .. } => vec![*variance],
-            Kind::Rest(rest, _) => {
-                let noise = squared * rest.variance;
-                let all = noise + rest.rate_variance + rest.vertical_variance;
-                all.as_slice().to_vec()
-            }
+            Kind::Input {
+                sensor,
+                noise,
+                variance,
+                ..
+            } => (squared[*sensor] * noise + variance).as_slice().to_vec(),
             Kind::Turn(t, _) => vec![self.turns[*t].variance(mean); 2],
             Kind::Closure(closure, known) => {
                 let noise = self.turns[closure.turns.clone()].iter();
@@ -467,11 +516,18 @@ impl<'a> State<'a> {
                     );
                 }
             }
-            Kind::Rest(rest, chain) => {
-                let found = vector::at(&model(Sensor::Gyro), &rest.raw, &rest.rate);
+            Kind::Input {
+                sensor,
+                raw,
+                known,
+                chain,
+                ..
+            } => {
+                let found = vector::at(&model(*sensor), raw, known);
                 rows.residuals(found.residual.as_slice());
-                rows.by_triad(Sensor::Gyro, step, &found.by);
-                if let Some((chain, level)) = chain.zip(self.level.get(&rest.dwell)) {
+                rows.by_triad(*sensor, step, &found.by);
+                let level = factor.dwells.and_then(|of| self.level.get(&of[0]));
+                if let Some((chain, level)) = chain.zip(level) {
                     rows.by(
                         ParameterBlock::LevelRate(chain),
                         &-Matrix3x2::from_columns(level),

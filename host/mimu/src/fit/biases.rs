@@ -4,6 +4,7 @@ use mimu_core::compensation::Affine;
 use nalgebra::Vector3;
 
 use super::hold_out::HoldOut;
+use super::judged::Judged;
 use super::sensor::{Residual, SensorFit};
 use super::{Fit, Options, earth, finish, plausible, refuse_wrong_gravity, session_bias};
 use crate::estimate::{Estimated, Observation};
@@ -140,16 +141,16 @@ fn judged(
         true => Figure::GravityMagnitude,
         false => Figure::Input,
     };
-    let n = observations.len();
-    finish(
-        sensor,
-        estimated,
+    let judged = Judged {
         figure,
         residuals,
-        n,
-        None,
-        (HoldOut::none(), &[]),
-    )
+        dwells: observations.len(),
+        static_rms: None,
+        held_out: HoldOut::none(),
+        unseen: Vec::new(),
+        uncalibrated_rms: None,
+    };
+    finish(sensor, estimated, judged)
 }
 
 #[cfg(test)]

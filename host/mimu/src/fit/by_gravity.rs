@@ -4,20 +4,19 @@ use mimu_core::compensation::Affine;
 use nalgebra::{Matrix3, Vector3};
 
 use super::determined::{faces_not_up, unseen_poses};
-use super::hold_out::{Refits, Split, determined};
-use super::magnitudes::Magnitudes;
-use super::predicted::{self, Both};
-use super::sensor::{Residual, SensorFit, rms, typical};
-use super::{Fit, Options, finish, refuse_wrong_gravity, uncalibrated};
+use super::hold_out::Split;
+use super::judged::{InSample, Parts, Refit};
+use super::sensor::SensorFit;
+use super::{Fit, Options, finish, lost, refuse_wrong_gravity};
 use crate::estimate::rotation::Data;
 use crate::estimate::with_turns::JointFit;
 use crate::estimate::{Estimated, Failure, Observation, magnitude, rotation};
-use crate::observation::magnitude::Magnitude;
-use crate::observation::turn::{Rest, Turn, TurnError};
-use crate::observation::{place, vector};
+use crate::judging::{Both, Judging, Models};
+use crate::observation::turn::{Rest, Turn};
+use crate::observation::{ByTriad, place};
 use crate::prepared::Prepared;
 use crate::prior::{Prior, TriadPrior};
-use crate::quantity::{AXES, Figure, PerSensor, Sensor};
+use crate::quantity::{AXES, PerSensor, Sensor};
 use crate::signal::blocks::quantile;
 use crate::signal::dwell::Fault;
 use crate::triad::{Covariance, Part, Triad};
@@ -52,36 +51,32 @@ pub(super) fn fit_gravity(
     }
     let (accel, with_turns) =
         estimated.map_err(|f| prepared.refused(by_poses.with_faces(f), Sensor::Accel))?;
-    let floors = prepared.magnitude_floors(&accel.triad.inverse, &poses);
-    let parts = options.holdout_blocks.min(poses.len());
-    let part_of = |split: Split, dwell: usize| split.part(dwell, prepared.dwells.list.len(), parts);
-    let known = Magnitudes(poses.iter().map(|o| (o, g)).collect());
-    let mut residuals = known.residuals(&accel.triad, &floors);
-    let typical = typical(Figure::GravityMagnitude, &residuals);
-    let without = |split: Split, part: usize| {
-        let kept = |dwell: usize| part_of(split, dwell) != part;
-        let refit = by_poses.without(&kept, with_turns.as_ref())?;
-        let open = known.of_part((split, part), &part_of).map(|(o, g)| {
-            let error = Magnitude::at(&accel.triad.inverse, &o.raw, g);
-            refit.triad.variance(&error.block.by(0))
-        });
-        determined(open, typical, (Figure::GravityMagnitude, Sensor::Accel))?;
-        Ok(refit)
+    let parts = Parts::new(
+        options.holdout_blocks.min(poses.len()),
+        prepared.dwells.list.len(),
+    );
+    let models = Models {
+        gyro: None,
+        accel: Some(accel.triad.inverse),
     };
-    let held_out = Refits::of(parts, without);
-    known.hold_out(&mut residuals, &held_out, &part_of);
-    let of_noise =
-        |accel: &Affine<f64>, own: &[Observation]| prepared.magnitude_variances(accel, own);
-    let unseen = known.unseen(&held_out, &part_of, Triad::known_covariance, of_noise);
+    let with = |models: &Models| Judging::of(prepared, Sensor::Accel, models);
+    let in_sample = with(&models).and_then(|judging| InSample::of(judging, models, parts));
+    let in_sample = in_sample.ok_or_else(|| lost(prepared, Sensor::Accel))?;
+    let errors = &in_sample.errors;
+    let refit = |split: Split, part: usize| {
+        let kept = |dwell: usize| parts.of(split, dwell) != part;
+        let accel = by_poses.without(&kept, with_turns.as_ref())?;
+        let refit = Refit::of_one(Sensor::Accel, accel.triad.clone(), ByTriad::zeros());
+        Ok((accel, errors.checked(refit, split, part)?))
+    };
+    let judged = in_sample.held_out(&with, prepared.is_in_si(), |split, part| {
+        Ok(refit(split, part)?.1)
+    });
     let mut sensors = Vec::new();
     // A table of means has no turns; its warnings say so.
     if prepared.has(Sensor::Gyro) && options.wants(Sensor::Gyro) && !prepared.manifest.means {
-        let parts = Parts {
-            count: parts,
-            of: &part_of,
-            accel_without: &without,
-        };
-        let turns = fit_turns(prepared, &accel, &parts, warnings);
+        let without = |split, part| Ok(refit(split, part)?.0);
+        let turns = fit_turns(prepared, &accel, (parts, &without), warnings);
         // If only the turns determined the accelerometer, and they do not determine the gyro, the poses are wrong.
         if let (Err(_), Some(_), Err(failure)) =
             (&turns, &with_turns, by_poses.without(&|_| true, None))
@@ -90,17 +85,8 @@ pub(super) fn fit_gravity(
         }
         sensors.extend(turns?);
     }
-    let not_seen = unseen_poses(g, &accel.triad, typical);
-    let mut fit = finish(
-        Sensor::Accel,
-        accel,
-        Figure::GravityMagnitude,
-        residuals,
-        poses.len(),
-        None,
-        (held_out.into(), &unseen),
-    );
-    fit.uncalibrated_rms = uncalibrated::magnitudes(prepared, Figure::GravityMagnitude, &known.0);
+    let not_seen = unseen_poses(g, &accel.triad, errors.typical);
+    let mut fit = finish(Sensor::Accel, accel, judged);
     fit.warnings.extend(not_seen);
     sensors.push(fit);
     Ok(sensors)
@@ -148,13 +134,9 @@ fn turns_alone(
         return Ok(Vec::new());
     }
     let dwells = prepared.dwells.list.len();
-    let parts = options.holdout_blocks.min(dwells);
-    let parts = Parts {
-        count: parts,
-        of: &|split, dwell| split.part(dwell, dwells, parts),
-        accel_without: &|_, _| Ok(accel.clone()),
-    };
-    let fit = fit_turns(prepared, &accel, &parts, warnings)?;
+    let parts = Parts::new(options.holdout_blocks.min(dwells), dwells);
+    let given = |_, _| Ok(accel.clone());
+    let fit = fit_turns(prepared, &accel, (parts, &given), warnings)?;
     let fit = fit.map(|mut fit| {
         with_doubt(prepared, &mut fit, &accel);
         fit
@@ -168,19 +150,19 @@ fn turns_alone(
 /// Adds to the floors of turns what the directions of `accel` err by. After whole turns the unit lies as before, so that these errors cancel; from pose to pose
 /// they are degrees, and would pass for outliers.
 fn with_doubt(prepared: &Prepared, fit: &mut SensorFit, accel: &Estimated) {
-    let models = [&fit.estimated.triad.inverse, &accel.triad.inverse];
-    let of_accel = Both {
-        gyro: Covariance::zeros(),
-        accel: accel.triad.inverse_covariance,
-        follows: Covariance::zeros(),
+    let models = Models {
+        gyro: Some(fit.estimated.triad.inverse),
+        accel: Some(accel.triad.inverse),
     };
-    let (turns, _) = prepared.turns(models[1]);
-    let of_turns = fit.residuals.iter_mut().zip(&turns);
-    for (residual, turn) in of_turns.filter(|(residual, _)| residual.floor.is_finite()) {
-        let unseen = predicted::directions(std::slice::from_ref(turn), models, &of_accel);
-        residual.floor = residual
-            .floor
-            .max(unseen.predicted.variances().sum().sqrt());
+    let of_accel = Both::of_one(Sensor::Accel, accel.triad.inverse_covariance);
+    let Some(judging) = Judging::of(prepared, Sensor::Gyro, &models) else {
+        return;
+    };
+    let all = judging.unseen(&models, &of_accel, |_| true);
+    let variances = all.map_or_else(Default::default, |all| all.predicted.variances());
+    let of_turns = fit.residuals.iter_mut().zip(variances.as_slice().chunks(2));
+    for (residual, own) in of_turns.filter(|(residual, _)| residual.floor.is_finite()) {
+        residual.floor = residual.floor.max(own.iter().sum::<f64>().sqrt());
     }
 }
 
@@ -354,15 +336,8 @@ impl ByPoses<'_> {
             matrix: Matrix3::identity() * scale,
             offset: Vector3::zeros(),
         };
-        Some(Estimated {
-            triad: Triad::from_inverse(inverse, vec![part])?,
-            scatter: Vec::new(),
-            condition: 1.0,
-            delays: None,
-            earth: Vec::new(),
-            follows_accel: None,
-            notes: Vec::new(),
-        })
+        let triad = Triad::from_inverse(inverse, vec![part])?;
+        Some(Estimated::new(triad, Vec::new(), 1.0))
     }
 
     /// The fit to the `kept` dwells; with `guesses`, to the turns between them as well.
@@ -438,60 +413,40 @@ impl ByPoses<'_> {
     }
 }
 
-/// The parts of a recording, and its accelerometer fitted without one of them.
-struct Parts<'a> {
-    count: usize,
-    of: &'a (dyn Fn(Split, usize) -> usize + Sync),
-    accel_without: &'a (dyn Fn(Split, usize) -> std::result::Result<Estimated, Failure> + Sync),
-}
+/// The fit of the accelerometer without a part of the dwells.
+type AccelWithout<'a> = &'a (dyn Fn(Split, usize) -> Outcome<Estimated> + Sync);
 
-/// Fits of the gyro, and of the accelerometer whose directions it takes, without each part of the dwells. `typical`: of the direction's errors, rad.
-fn refits(
+/// The fit of the gyro, and of the accelerometer whose directions it takes, without a part of the dwells.
+fn refit(
     prepared: &Prepared,
     data: &Data,
     gyro: &Estimated,
-    parts: &Parts,
-    typical: f64,
-) -> Refits<(Estimated, Estimated)> {
-    Refits::of(parts.count, |split, part| {
-        let accel = (parts.accel_without)(split, part).map_err(|failure| {
-            let problem = failure.problem();
-            Failure::NoSolution(format!("the accelerometer is not determined: {problem}"))
-        })?;
-        let of_part = |dwell: usize| (parts.of)(split, dwell) == part;
-        let kept: Vec<_> = prepared.turns(&accel.triad.inverse).0;
-        let kept: Vec<_> = kept
-            .into_iter()
-            .filter(|t| !of_part(t.from) && !of_part(t.to))
-            .collect();
-        let rest: Vec<_> = data
-            .rest
-            .iter()
-            .filter(|o| !of_part(o.dwell))
-            .copied()
-            .collect();
-        let start = Some(&gyro.triad.inverse);
-        let refit = by_turns(
-            prepared,
-            &Data {
-                turns: &kept,
-                rest: &rest,
-                accel: &accel.triad,
-                motions: &[],
-                start,
-                ..*data
-            },
-        )?;
-        let open = data.turns.iter().filter(|t| of_part(t.to)).map(|t| {
-            let block = TurnError::at(t, &gyro.triad.inverse).block;
-            [0, 1]
-                .map(|k| refit.triad.variance(&block.by(k)))
-                .iter()
-                .sum()
-        });
-        determined(open, typical, (Figure::Direction, Sensor::Gyro))?;
-        Ok((refit, accel))
-    })
+    (parts, accel_without): (Parts, AccelWithout),
+    (split, part): (Split, usize),
+) -> Outcome<Refit> {
+    let accel = accel_without(split, part).map_err(|failure| {
+        let problem = failure.problem();
+        Failure::NoSolution(format!("the accelerometer is not determined: {problem}"))
+    })?;
+    let of_part = |dwell: usize| parts.of(split, dwell) == part;
+    let kept = prepared.turns(&accel.triad.inverse).0.into_iter();
+    let kept: Vec<Turn> = kept
+        .filter(|t| !of_part(t.from) && !of_part(t.to))
+        .collect();
+    let rest = data.rest.iter().filter(|o| !of_part(o.dwell));
+    let rest: Vec<Rest> = rest.copied().collect();
+    let refit = by_turns(
+        prepared,
+        &Data {
+            turns: &kept,
+            rest: &rest,
+            accel: &accel.triad,
+            motions: &[],
+            start: Some(&gyro.triad.inverse),
+            ..*data
+        },
+    )?;
+    Ok(Refit::of_both(refit, &accel.triad))
 }
 
 /// The gyro from the turns. A turn belongs to the part of the dwell in which it ends. While a part is left out, no turn that touches one of its
@@ -499,7 +454,7 @@ fn refits(
 fn fit_turns(
     prepared: &Prepared,
     accel: &Estimated,
-    parts: &Parts,
+    (parts, accel_without): (Parts, AccelWithout),
     warnings: &mut Vec<Warning>,
 ) -> Result<Option<SensorFit>> {
     let g = prepared.manifest.gravity_mps2;
@@ -525,53 +480,22 @@ fn fit_turns(
     };
     let gyro = by_turns(prepared, &data).map_err(|f| prepared.refused(f, Sensor::Gyro))?;
     warnings.extend(clipped(prepared, &gyro.triad.inverse));
-    let c = gyro.triad.inverse.matrix;
-    let mean_square = c.norm_squared() / 3.0;
-    let mut residuals: Vec<Residual> = turns
-        .iter()
-        .map(|t| Residual {
-            dwell: t.to,
-            within: false,
-            value: TurnError::at(t, &gyro.triad.inverse).vector(),
-            held_out: None,
-            floor: prepared.if_noise_known(&Sensor::BOTH, t.floor(mean_square)),
-        })
-        .collect();
-    let typical = typical(Figure::Direction, &residuals);
-    let held = refits(prepared, &data, &gyro, parts, typical);
-    let without = |dwell: usize| held.without((parts.of)(held.split, dwell));
-    for (residual, turn) in residuals.iter_mut().zip(&turns) {
-        residual.held_out = without(turn.to).map(|(gyro, accel)| {
-            TurnError::at(&turn.with(&accel.triad.inverse), &gyro.triad.inverse).vector()
-        });
-    }
-    let unseen = held.unseen(|part, (gyro, accel)| {
-        let own = turns
-            .iter()
-            .filter(|t| (parts.of)(held.split, t.to) == part);
-        let own: Vec<Turn> = own.copied().collect();
-        let both = Both::of(gyro, &accel.triad);
-        let models = [&gyro.triad.inverse, &accel.triad.inverse];
-        predicted::directions(&own, models, &both)
-    });
-    let static_rms = |rate: &dyn Fn(&Rest) -> Option<Vector3<f64>>| {
-        let all: Vec<_> = rest.iter().filter_map(rate).collect();
-        (!all.is_empty()).then(|| rms(Figure::Input, all.into_iter()))
+    let models = Models {
+        gyro: Some(gyro.triad.inverse),
+        accel: Some(*by_full),
     };
-    let at_rest = |gyro: &Triad, o: &Rest| vector::at(&gyro.inverse, &o.raw, &o.rate).residual;
-    let in_sample = static_rms(&|o| Some(at_rest(&gyro.triad, o)));
-    let held_at_rest = static_rms(&|o| Some(at_rest(&without(o.dwell)?.0.triad, o)));
-    let wide = residuals.iter().map(|r| r.value.norm()).fold(0.0, f64::max);
-    let mut fit = finish(
-        Sensor::Gyro,
-        gyro,
-        Figure::Direction,
-        residuals,
-        rest.len(),
-        in_sample.map(|r| (r, held_at_rest)),
-        (held.into(), &unseen),
-    );
-    fit.uncalibrated_rms = uncalibrated::directions(prepared, &turns);
+    let with = |models: &Models| Judging::of(prepared, Sensor::Gyro, models);
+    let in_sample = with(&models).and_then(|judging| InSample::of(judging, models, parts));
+    let in_sample = in_sample.ok_or_else(|| lost(prepared, Sensor::Gyro))?;
+    let errors = &in_sample.errors;
+    let judged = in_sample.held_out(&with, prepared.is_in_si(), |split, part| {
+        let without = (parts, accel_without);
+        let refit = refit(prepared, &data, &gyro, without, (split, part))?;
+        errors.checked(refit, split, part)
+    });
+    let sizes = judged.residuals.iter().map(|r| r.value.norm());
+    let wide = sizes.fold(0.0, f64::max);
+    let mut fit = finish(Sensor::Gyro, gyro, judged);
     if wide > 20f64.to_radians() {
         fit.warnings
             .push(Warning::WideTurn { angle: wide }.of(Sensor::Gyro));

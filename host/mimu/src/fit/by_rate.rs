@@ -3,24 +3,21 @@
 //! The turntable's force on an accelerometer beside the axis is unknown, so the accelerometer is fitted to gravity, from the dwells at rest.
 
 use mimu_core::compensation::Affine;
-use nalgebra::Vector3;
 
 use super::by_gravity::fit_gravity;
-use super::hold_out::{Refits, Split, determined};
-use super::magnitudes::Magnitudes;
-use super::sensor::{SensorFit, rms, typical};
-use super::{Options, finish, uncalibrated};
+use super::judged::{InSample, Parts, Refit};
+use super::sensor::SensorFit;
+use super::{Options, finish, lost};
 use crate::estimate::magnitude::{self, KnownMagnitudes};
 use crate::estimate::{Estimated, Failure, Observation};
-use crate::factor::Factors;
-use crate::observation::magnitude::Magnitude;
+use crate::judging::{Judging, Models};
 use crate::observation::turn::Rest;
-use crate::prepared::{Prepared, si_covariance};
+use crate::prepared::Prepared;
 use crate::prior::TriadPrior;
-use crate::quantity::{Figure, Sensor};
+use crate::quantity::Sensor;
 use crate::signal::power_ons::PowerOns;
-use crate::triad::{Triad, vector};
-use crate::turntable::RatedDwells;
+use crate::triad::vector;
+use crate::turntable::{RatedDwells, variances};
 use crate::warning::Warning;
 use mimu_recording::error::{Error, Result};
 
@@ -86,50 +83,23 @@ fn fit_gyro(prepared: &Prepared, dwells: &RatedDwells, options: Options) -> Resu
     };
     let inverse = gyro.triad.inverse;
     dwells.refuse_other_rate(prepared, &rates(&inverse))?;
-    let rated = dwells.turning.iter().zip(dwells.magnitudes());
-    let rated = Magnitudes(rated.collect());
-    let floors = variances(&inverse, &dwells.turning).into_iter();
-    let floors: Vec<f64> = floors
-        .map(|v| prepared.if_noise_known(&[Sensor::Gyro], v.sqrt()))
-        .collect();
-    let mut residuals = rated.residuals(&gyro.triad, &floors);
-    let typical = typical(Figure::RateMagnitude, &residuals);
-    let parts = options.holdout_blocks.min(rated.0.len());
-    let part_of = |split: Split, dwell: usize| split.part(dwell, prepared.dwells.list.len(), parts);
-    // The error of the rates is common to kept and held-out dwells, so no refit is judged by it.
-    let held_out = Refits::of(parts, |split, part| {
-        let refit = estimate(&|dwell| part_of(split, dwell) != part)?;
-        let scale = dwells.rate_sigma;
-        let open = rated.of_part((split, part), &part_of).map(|(o, rate)| {
-            let by = Magnitude::at(&inverse, &o.raw, rate).block.by(0);
-            (refit.triad.variance(&by) - (scale * rate).powi(2)).max(0.0)
-        });
-        determined(open, typical, (Figure::RateMagnitude, Sensor::Gyro))?;
-        Ok(refit)
+    let models = Models {
+        gyro: Some(inverse),
+        accel: None,
+    };
+    let count = options.holdout_blocks.min(dwells.turning.len());
+    let parts = Parts::new(count, prepared.dwells.list.len());
+    let with = |models: &Models| Judging::rated(prepared, dwells, models);
+    let in_sample = with(&models).and_then(|judging| InSample::of(judging, models, parts));
+    let in_sample = in_sample.ok_or_else(|| lost(prepared, Sensor::Gyro))?;
+    let judged = in_sample.held_out(&with, prepared.is_in_si(), |split, part| {
+        let refit = estimate(&|dwell| parts.of(split, dwell) != part)?.triad;
+        // The error of the rates is common to kept and held-out dwells, so no refit is judged by it.
+        let all = vector(&refit.inverse.matrix, &refit.inverse.offset);
+        let refit = Refit::of_one(Sensor::Gyro, refit, all * dwells.rate_sigma);
+        in_sample.errors.checked(refit, split, part)
     });
-    let without = |dwell: usize| held_out.without(part_of(held_out.split, dwell));
-    rated.hold_out(&mut residuals, &held_out, &part_of);
-    let at_rest = |rate: &dyn Fn(&Rest) -> Option<Vector3<f64>>| {
-        let all: Vec<Vector3<f64>> = dwells.rests.iter().filter_map(rate).collect();
-        (!all.is_empty()).then(|| rms(Figure::Input, all.into_iter()))
-    };
-    let static_rms = at_rest(&|r| Some(inverse.apply(&r.raw)));
-    let static_held_out = at_rest(&|r| Some(without(r.dwell)?.triad.inverse.apply(&r.raw)));
-    let beside_the_rates = |triad: &Triad| {
-        let common = vector(&triad.inverse.matrix, &triad.inverse.offset) * dwells.rate_sigma;
-        triad.known_covariance() - common * common.transpose()
-    };
-    let unseen = rated.unseen(&held_out, &part_of, beside_the_rates, variances);
-    let mut fit = finish(
-        Sensor::Gyro,
-        gyro,
-        Figure::RateMagnitude,
-        residuals,
-        dwells.turning.len() + dwells.rests.len(),
-        static_rms.map(|r| (r, static_held_out)),
-        (held_out.into(), &unseen),
-    );
-    fit.uncalibrated_rms = uncalibrated::magnitudes(prepared, Figure::RateMagnitude, &rated.0);
+    let mut fit = finish(Sensor::Gyro, gyro, judged);
     let rates_dps = dwells.rates.iter().map(|r| r.to_degrees()).collect();
     let error = prepared
         .manifest
@@ -183,23 +153,4 @@ fn estimate(
     let rough = sphere.map_or_else(|| vec![0.0; turning.len()], |s| variances(&s, &turning));
     let first = magnitude::estimate(&turning, &rough, &known)?;
     magnitude::estimate(&turning, &variances(&first.triad.inverse, &turning), &known)
-}
-
-/// Variances of the compensated magnitudes by noise, (rad/s)²; zero if the noise is unknown.
-pub(crate) fn variances(inverse: &Affine<f64>, observations: &[Observation]) -> Vec<f64> {
-    let along = |o: &Observation| {
-        let up = inverse.apply(&o.raw).normalize();
-        up.dot(&(si_covariance(&inverse.matrix, &o.variance) * up))
-    };
-    observations.iter().map(along).collect()
-}
-
-/// The magnitudes of the turning dwells, with their noise by the `gyro`.
-pub(crate) fn magnitudes(dwells: &RatedDwells, gyro: &Affine<f64>) -> Factors<'static> {
-    let mut factors = Factors::default();
-    let known = dwells.turning.iter().zip(dwells.magnitudes());
-    for ((o, rate), variance) in known.zip(variances(gyro, &dwells.turning)) {
-        factors.magnitude(Sensor::Gyro, (o.dwell, o.raw), (rate, None), variance);
-    }
-    factors
 }

@@ -5,7 +5,6 @@ use serde::Serialize;
 
 use crate::estimate::Failure;
 use crate::quantity::{Figure, Sensor, significant};
-use crate::unseen::Unseen;
 use crate::warning::Warning;
 
 /// How dwells are held out.
@@ -124,13 +123,6 @@ impl<T: Send> Refits<T> {
             refits: blocks,
             reasons: vec![why],
         }
-    }
-
-    /// What each part that was held out was predicted to err by.
-    pub fn unseen(&self, of: impl Fn(usize, &T) -> Unseen) -> Vec<Unseen> {
-        let each = self.refits.iter().enumerate();
-        let held = each.filter_map(|(part, refit)| Some(of(part, refit.as_ref().ok()?)));
-        held.collect()
     }
 
     /// The fit without `part`.

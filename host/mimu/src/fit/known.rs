@@ -5,11 +5,13 @@ use std::borrow::Cow;
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::hold_out::{Refits, Split, determined};
+use super::judged::Judged;
 use super::predicted::LinearAxis;
 use super::reference_error::{Influence, Influences};
 use super::sensor::{Residual, SensorFit, typical};
-use super::{Options, finish, lever_arm, refuse_wrong_gravity, uncalibrated};
+use super::{Options, finish, lever_arm, refuse_wrong_gravity};
 use crate::estimate::{Estimated, Failure, Observation, known_input};
+use crate::judging::rms;
 use crate::observable::Observable;
 use crate::observation::slope;
 use crate::prepared::{Prepared, si_covariance};
@@ -253,17 +255,19 @@ impl<'a> Known<'a> {
             true => Vec::new(),
             false => self.unseen(&estimated, &all, &held_out, part_of),
         };
-        let mut fit = finish(
-            sensor,
-            estimated,
-            Figure::Input,
+        let as_read = all.iter().map(|(o, _)| o.raw - o.input);
+        let in_si = prepared.is_in_si();
+        let judged = Judged {
+            figure: Figure::Input,
             residuals,
-            n,
-            None,
-            (held_out.into(), &unseen),
-        );
+            dwells: n,
+            static_rms: None,
+            held_out: held_out.into(),
+            unseen,
+            uncalibrated_rms: in_si.then(|| rms(Figure::Input, as_read)),
+        };
+        let mut fit = finish(sensor, estimated, judged);
         fit.influences = influences;
-        fit.uncalibrated_rms = uncalibrated::inputs(prepared, all.iter().map(|(o, _)| *o));
         Ok(fit)
     }
 }

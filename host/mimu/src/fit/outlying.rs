@@ -140,7 +140,7 @@ fn fit_poses(prepared: &Prepared, poses: &[Observation]) -> Option<Estimated> {
 }
 
 fn outlying_poses(prepared: &Prepared, poses: &[Observation], accel: &Affine<f64>) -> Vec<Judged> {
-    let factors = prepared.magnitudes(accel);
+    let (factors, _) = prepared.magnitudes(accel);
     let rows = Row::of(&factors, (Sensor::Accel, accel), &LOWER);
     let Some(found) = against_others(&rows, rows.len(), 1.0) else {
         return Vec::new();

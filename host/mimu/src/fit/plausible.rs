@@ -7,6 +7,7 @@ use super::of_temperature::with_temperature;
 use super::off_level::off_level;
 use super::sensor::{Residual, SensorFit};
 use crate::estimate::Failure;
+use crate::judging::known_size;
 use crate::prepared::Prepared;
 use crate::quantity::{Figure, Sensor, significant};
 use crate::signal::unit_in_si::restless;
@@ -86,29 +87,18 @@ pub fn check_numbers(fit: &SensorFit) -> Result<()> {
 /// Size of the input, in the unit of the figure: root mean square of the known inputs about their mean; if these are unknown, the size of the
 /// quantity that the figure describes.
 pub fn input_size(prepared: &Prepared, fit: &SensorFit) -> f64 {
-    match fit.figure {
-        Figure::Direction => 1.0,
-        Figure::GravityMagnitude => prepared.manifest.gravity_mps2,
-        Figure::RateMagnitude => {
-            let rates = prepared
-                .manifest
-                .turntable
-                .iter()
-                .flat_map(|t| &t.rates_dps);
-            rates.fold(0.0, |most, rate| f64::max(most, rate.to_radians()))
-        }
-        Figure::Input => {
-            let dwell = |r: &Residual| prepared.dwells.list[r.dwell].input(fit.sensor);
-            let means = fit.residuals.iter().filter(|r| !r.within);
-            let inputs: Vec<_> = means.filter_map(dwell).collect();
-            let n = inputs.len() as f64;
-            let mean = inputs.iter().sum::<nalgebra::Vector3<f64>>() / n;
-            let squares = inputs.iter().map(|x| (x - mean).norm_squared());
-            let within = prepared.within_dwells(fit.sensor);
-            let moved: f64 = within.iter().map(|o| o.input.norm_squared()).sum();
-            ((squares.sum::<f64>() + moved) / (3.0 * n)).sqrt()
-        }
+    if let Some(size) = known_size(prepared, fit.figure) {
+        return size;
     }
+    let dwell = |r: &Residual| prepared.dwells.list[r.dwell].input(fit.sensor);
+    let means = fit.residuals.iter().filter(|r| !r.within);
+    let inputs: Vec<_> = means.filter_map(dwell).collect();
+    let n = inputs.len() as f64;
+    let mean = inputs.iter().sum::<nalgebra::Vector3<f64>>() / n;
+    let squares = inputs.iter().map(|x| (x - mean).norm_squared());
+    let within = prepared.within_dwells(fit.sensor);
+    let moved: f64 = within.iter().map(|o| o.input.norm_squared()).sum();
+    ((squares.sum::<f64>() + moved) / (3.0 * n)).sqrt()
 }
 
 /// Refuses readings that do not follow their inputs. If they do with temperature in the model, they are fitted, with a warning.

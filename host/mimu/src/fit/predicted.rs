@@ -1,77 +1,9 @@
 //! Held-out errors of a fit and their predicted covariances, for [`crate::unseen`].
 
-use mimu_core::compensation::Affine;
 use nalgebra::{DMatrix, DVector};
 
 use crate::estimate::least_squares::{Errors, root};
-use crate::estimate::{Estimated, Observation};
-use crate::factor::Factors;
-use crate::observation::turn::Turn;
-use crate::quantity::Sensor;
-use crate::triad::{Covariance, Triad};
 use crate::unseen::Unseen;
-
-/// Errors of `factors` by these calibrations, whose parameters have the covariance `root rootᵀ`.
-fn unseen(factors: &Factors, models: &[(Sensor, &Affine<f64>)], root: &DMatrix<f64>) -> Unseen {
-    let values = factors.values(models);
-    let (at, noise) = (factors.at(&values), factors.variances(&values));
-    Unseen::of(at.residuals, noise.into(), &at.jacobian, root)
-}
-
-/// Errors of magnitudes that are `known`, by a triad whose parameters have this `covariance`. `variances`: of the magnitudes by noise.
-pub(crate) fn magnitudes<'a>(
-    model: &Affine<f64>,
-    covariance: &Covariance,
-    known: impl Iterator<Item = (&'a Observation, f64)>,
-    variances: Vec<f64>,
-) -> Unseen {
-    let mut factors = Factors::default();
-    for ((o, size), variance) in known.zip(variances) {
-        factors.magnitude(Sensor::Accel, (o.dwell, o.raw), (size, None), variance);
-    }
-    let models = [(Sensor::Accel, model)];
-    unseen(&factors, &models, &root(&covariance.resize(12, 12, 0.0)))
-}
-
-/// How uncertain a gyro and an accelerometer are by what is known: of one, of the other, and how the gyro follows the accelerometer.
-pub(crate) struct Both {
-    /// Of the gyro: C by rows, then o.
-    pub gyro: Covariance,
-    /// Of the accelerometer.
-    pub accel: Covariance,
-    /// What a unit of error of each parameter of the accelerometer adds to those of the gyro.
-    pub follows: Covariance,
-}
-
-impl Both {
-    /// Of two triads of one fit.
-    pub fn of(gyro: &Estimated, accel: &Triad) -> Self {
-        Self {
-            gyro: gyro.triad.known_covariance(),
-            accel: accel.known_covariance(),
-            follows: gyro.follows_accel.unwrap_or_else(Covariance::zeros),
-        }
-    }
-
-    /// A root of the covariance of the twenty-four parameters.
-    fn root(&self) -> DMatrix<f64> {
-        let with = self.follows * self.accel;
-        let full = DMatrix::from_fn(24, 24, |i, j| match (i < 12, j < 12) {
-            (true, true) => self.gyro[(i, j)],
-            (true, false) => with[(i, j - 12)],
-            (false, true) => with[(j, i - 12)],
-            (false, false) => self.accel[(i - 12, j - 12)],
-        });
-        root(&full)
-    }
-}
-
-/// Errors of the directions after `turns`, two for each, by the gyro and the accelerometer.
-pub(crate) fn directions(turns: &[Turn], [gyro, accel]: [&Affine<f64>; 2], of: &Both) -> Unseen {
-    let factors = Factors::of_turns(turns);
-    let models = [(Sensor::Gyro, gyro), (Sensor::Accel, accel)];
-    unseen(&factors, &models, &of.root())
-}
 
 /// Readings of one axis that depend linearly on a few parameters, with their known errors, and how a fit weights them.
 pub(crate) struct LinearAxis {

@@ -5,6 +5,7 @@ use nalgebra::Vector3;
 use super::hold_out::HoldOut;
 use super::reference_error::Influence;
 use crate::estimate::Estimated;
+use crate::judging::rms;
 use crate::quantity::{Figure, Sensor};
 use crate::unseen::Test;
 use crate::warning::Warning;
@@ -84,17 +85,4 @@ pub(super) fn typical(figure: Figure, residuals: &[Residual]) -> f64 {
     let floor = |r: &Residual| Vector3::new(r.floor, 0.0, 0.0);
     let in_sample = rms(figure, residuals.iter().map(|r| r.value));
     in_sample.max(rms(Figure::GravityMagnitude, residuals.iter().map(floor)))
-}
-
-/// Root mean square: over axes if the input is known, otherwise of the angle or magnitude.
-pub(super) fn rms(figure: Figure, values: impl Iterator<Item = Vector3<f64>>) -> f64 {
-    let (mut sum, mut n) = (0.0, 0.0);
-    for v in values {
-        sum += v.norm_squared();
-        n += match figure {
-            Figure::Input => 3.0,
-            Figure::GravityMagnitude | Figure::RateMagnitude | Figure::Direction => 1.0,
-        };
-    }
-    (sum / n).sqrt()
 }

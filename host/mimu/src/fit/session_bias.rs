@@ -86,7 +86,7 @@ fn by_magnitudes(prepared: &Prepared, known: &Affine<f64>) -> Option<Biases> {
     let mut last: Option<(Solution, Scatter)> = None;
     let mut kept = DMatrix::zeros(3, 0);
     for _ in 0..STEPS {
-        let factors = prepared.magnitudes(&model);
+        let (factors, _) = prepared.magnitudes(&model);
         let values = factors.values(&[(Sensor::Accel, &model)]);
         let at = factors.at(&values);
         let design = at.jacobian.columns(9, 3).into_owned();

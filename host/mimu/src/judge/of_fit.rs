@@ -30,11 +30,10 @@ impl ErrorFigures {
 
 /// How many dwells or turns would test the model, if `sensor` has fewer.
 fn too_few(sensor: &SensorFit) -> Option<String> {
-    let (each, what) = match sensor.figure {
-        Figure::Input => (3.0, "dwells"),
-        Figure::GravityMagnitude | Figure::RateMagnitude => (1.0, "dwells"),
-        // A direction has two angles.
-        Figure::Direction => (2.0, "turns"),
+    let each = sensor.figure.components() as f64;
+    let what = match sensor.figure {
+        Figure::Direction => "turns",
+        Figure::Input | Figure::GravityMagnitude | Figure::RateMagnitude => "dwells",
     };
     let test = sensor.test.filter(|test| !test.can_fail())?;
     let count = sensor.residuals.iter().filter(|r| !r.within).count();

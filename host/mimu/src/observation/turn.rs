@@ -255,6 +255,7 @@ fn integrate(
 const NEAR: f64 = 1e-4;
 
 /// Rotations of turns as [`integrate`] gives them, at one calibration.
+#[derive(Clone)]
 struct Reference {
     gyro: Affine<f64>,
     turned: Vec<Turned>,
@@ -262,7 +263,7 @@ struct Reference {
 
 /// The rotations of turns under calibrations that a fit tries one after the other. After the first few these are near each other, and are not
 /// integrated again: integrating took 80 % of the time of a fit of 36 turns with its held-out refits.
-#[derive(Default)]
+#[derive(Default, Clone)]
 pub(crate) struct Rotations {
     pieces: Vec<Vec<Piece>>,
     reference: RefCell<Option<Reference>>,

@@ -11,21 +11,18 @@
 use std::ops::Range;
 
 use mimu_core::compensation::Affine;
-use nalgebra::{DMatrix, DVector, SVector};
+use nalgebra::{DMatrix, DVector, SVector, Vector3};
 use serde::Serialize;
 
 use crate::calibration::Calibration;
-use crate::estimate::earth_shared;
 use crate::estimate::least_squares::{Errors, Group, Observability, Solution, solve_groups};
-use crate::factor::{Factors, Kind};
-use crate::fit::by_rate::magnitudes;
+use crate::factor::{Factor, Factors, Kind};
+use crate::judging::Judging;
 use crate::observable::Observable;
-use crate::observation::{ByTriad, of_output, vector};
-use crate::prepared::{Prepared, si_covariance};
-use crate::quantity::Sensor;
-use crate::triad::{Covariance, Forward};
-use crate::turntable::RatedDwells;
-use mimu_recording::Reference;
+use crate::observation::{ByTriad, of_output, slope};
+use crate::prepared::Prepared;
+use crate::quantity::{Figure, Sensor};
+use crate::triad::Covariance;
 
 /// Half-width of a 95 % interval in standard deviations.
 pub(super) const INTERVAL: f64 = 1.96;
@@ -89,23 +86,15 @@ impl Rows {
             .collect();
         let values = factors.values(&models);
         let (at, variances) = (factors.at(&values), factors.variances(&values));
-        // A multiplies the true input: that of a known size, where the measured one contains the error, and none at rest.
-        let input = factors.list.iter().zip(factors.ranges());
-        let input = input.flat_map(|(factor, rows)| {
-            let share = match factor.kind {
-                Kind::Magnitude { known, .. } => known / (known + at.residuals[rows.start]),
-                Kind::Rest(..) => 0.0,
-                _ => 1.0,
-            };
-            std::iter::repeat_n(share, rows.len())
-        });
-        let input: Vec<f64> = input.collect();
+        let of_rows = factors.list.iter().zip(factors.ranges());
+        let of_rows: Vec<(&Factor, usize)> = of_rows
+            .flat_map(|(factor, rows)| rows.map(move |row| (factor, row)))
+            .collect();
         let row = |i: usize| {
             let of_triad = |(k, (_, model, columns)): (usize, &Columns)| {
                 let by = at.jacobian.fixed_view::<1, 12>(i, 12 * k).transpose();
-                let mut by = of_output(&by, model);
-                by.fixed_rows_mut::<9>(0).scale_mut(input[i]);
-                columns(&by)
+                let by_output = of_output(&by, model);
+                columns(&of_input(of_rows[i].0, by_output, at.residuals[i]))
             };
             let by: Vec<f64> = triads.iter().enumerate().flat_map(of_triad).collect();
             (by, at.residuals[i], variances[i])
@@ -148,40 +137,57 @@ fn symmetric(by: &ByTriad) -> Vec<f64> {
     (9..12).map(|k| by[k]).chain(of_a).collect()
 }
 
-/// The causes of the errors of `sensor`; `None` if the recording does not distinguish them.
+/// A row's derivatives, which are by the output, by the true input: that of a known size, where the output contains the error, and none at rest.
+fn of_input(factor: &Factor, mut by: ByTriad, residual: f64) -> ByTriad {
+    match &factor.kind {
+        Kind::Magnitude { known, .. } => {
+            let share = known / (known + residual);
+            by.fixed_rows_mut::<9>(0).scale_mut(share);
+            by
+        }
+        Kind::Input { known, .. } => {
+            let along = by.fixed_rows::<3>(9).into_owned();
+            match factor.group {
+                Some(Observable::Rest) => slope(&along, &Vector3::zeros()),
+                _ => slope(&along, known),
+            }
+        }
+        _ => by,
+    }
+}
+
+/// The errors that judge a triad, group by group: those that its figure describes, then the rates at rest, then the magnitudes that its directions come from.
+fn rows(prepared: &Prepared, judging: &Judging, calibration: &Calibration) -> Option<Vec<Rows>> {
+    let model = calibration.inverse(judging.sensor)?;
+    let accel = calibration.inverse(Sensor::Accel);
+    let mut factors = judging.factors.clone();
+    factors.rests(&judging.rests);
+    let columns = match judging.figure {
+        Figure::Input | Figure::Direction => all,
+        Figure::GravityMagnitude | Figure::RateMagnitude => symmetric,
+    };
+    let mut triads: Vec<Columns> = vec![(judging.sensor, &model, columns)];
+    if judging.figure == Figure::Direction {
+        let accel = accel.as_ref()?;
+        factors.list.extend(prepared.magnitudes(accel).0.list);
+        triads.push((Sensor::Accel, accel, symmetric));
+    }
+    Some(Rows::of_groups(&factors, &triads))
+}
+
+/// The causes of the errors of a triad; `None` if the recording does not distinguish them.
 pub(super) fn of(
     prepared: &Prepared,
-    sensor: Sensor,
-    model: &Affine<f64>,
-    accel: Option<&Affine<f64>>,
+    judging: &Judging,
+    calibration: &Calibration,
 ) -> Option<Causes> {
-    match (prepared.manifest.reference, sensor) {
-        (Reference::Table, _) => known(prepared, sensor, model),
-        (Reference::Gravity | Reference::TurntableRate, Sensor::Accel) => {
-            separate(&by_gravity(prepared, model), &[0..3, 3..9])
-        }
-        (Reference::TurntableRate, Sensor::Gyro) => by_rate(prepared, model),
-        (Reference::Gravity, Sensor::Gyro) => {
-            let rows = by_directions(prepared, model, accel?)?;
-            separate(&rows, &[0..3, 3..12, 12..21])
-        }
-    }
-}
-
-fn known(prepared: &Prepared, sensor: Sensor, model: &Affine<f64>) -> Option<Causes> {
-    separate(&[known_rows(prepared, sensor, model)?], &[0..3, 3..12])
-}
-
-fn known_rows(prepared: &Prepared, sensor: Sensor, model: &Affine<f64>) -> Option<Rows> {
-    let mut rows = Vec::new();
-    let forward = Forward::of(model)?;
-    for o in earth_shared::likely(&prepared.observations(sensor), &forward.matrix) {
-        let error = vector::at(model, &o.raw, &o.input).residual;
-        let by = vector::at(&Affine::identity(), &o.input, &o.input);
-        let covariance = si_covariance(&model.matrix, &o.variance);
-        rows.extend([0, 1, 2].map(|k| (all(&by.by(k)), error[k], covariance[(k, k)])));
-    }
-    Some(Rows::of(rows, OF_TRIAD))
+    let rows = rows(prepared, judging, calibration)?;
+    let causes = match judging.figure {
+        Figure::Input => &[0..3, 3..12][..],
+        Figure::GravityMagnitude | Figure::RateMagnitude => &[0..3, 3..9],
+        Figure::Direction => &[0..3, 3..12, 12..21],
+    };
+    separate(&rows, causes)
 }
 
 /// How uncertain the parameters of each sensor are: the covariance of C by rows and o, and the half-width of a 95 % interval in standard deviations.
@@ -191,33 +197,23 @@ pub(super) type Uncertainty<'a> = &'a dyn Fn(Sensor) -> Option<(Covariance, f64)
 /// accelerometer's directions too. `None` if it is not known.
 pub(super) fn announced(
     prepared: &Prepared,
-    sensor: Sensor,
+    judging: &Judging,
     calibration: &Calibration,
     uncertainty: Uncertainty,
 ) -> Option<f64> {
+    let sensor = judging.sensor;
     let model = calibration.inverse(sensor)?;
     let (own, sigmas) = of_errors(&model, uncertainty(sensor)?)?;
     let mut of_accel = Covariance::zeros();
-    // Errors of each observation: one for a magnitude, two for a turn.
-    let (rows, each) = match (prepared.manifest.reference, sensor) {
-        (Reference::Table, _) => (known_rows(prepared, sensor, &model)?, 1.0),
-        (Reference::Gravity | Reference::TurntableRate, Sensor::Accel) => {
-            (by_gravity(prepared, &model).pop()?, 1.0)
+    // A turn has two errors, and its figure is their size.
+    let mut each = 1.0;
+    if judging.figure == Figure::Direction {
+        each = 2.0;
+        if let Some(known) = uncertainty(Sensor::Accel) {
+            of_accel = of_errors(&calibration.inverse(Sensor::Accel)?, known)?.0;
         }
-        (Reference::TurntableRate, Sensor::Gyro) => {
-            let dwells = RatedDwells::of(prepared).ok()?;
-            let of_gyro = [(Sensor::Gyro, &model, symmetric as fn(&ByTriad) -> _)];
-            let rows = Rows::of_groups(&magnitudes(&dwells, &model), &of_gyro).pop()?;
-            (rows, 1.0)
-        }
-        (Reference::Gravity, Sensor::Gyro) => {
-            let accel = calibration.inverse(Sensor::Accel)?;
-            if let Some(known) = uncertainty(Sensor::Accel) {
-                of_accel = of_errors(&accel, known)?.0;
-            }
-            (by_directions(prepared, &model, &accel)?.swap_remove(0), 2.0)
-        }
-    };
+    }
+    let rows = rows(prepared, judging, calibration)?.swap_remove(0);
     let square = |row: &[f64]| {
         let part = |row: &[f64], covariance: &Covariance| {
             let by = spread(row);
@@ -263,35 +259,6 @@ fn spread(row: &[f64]) -> SVector<f64, 12> {
         by[3 + 3 * j + i] += 0.5 * value;
     }
     by
-}
-
-fn by_gravity(prepared: &Prepared, accel: &Affine<f64>) -> Vec<Rows> {
-    Rows::of_groups(
-        &prepared.magnitudes(accel),
-        &[(Sensor::Accel, accel, symmetric)],
-    )
-}
-
-fn by_rate(prepared: &Prepared, gyro: &Affine<f64>) -> Option<Causes> {
-    let dwells = RatedDwells::of(prepared).ok()?;
-    let mut factors = magnitudes(&dwells, gyro);
-    factors.rests(&dwells.rests);
-    let rows = Rows::of_groups(&factors, &[(Sensor::Gyro, gyro, symmetric)]);
-    separate(&rows, &[0..3, 3..9])
-}
-
-/// Directions after turns, rates at rest, and magnitudes of gravity. `None` without a turn.
-fn by_directions(
-    prepared: &Prepared,
-    gyro: &Affine<f64>,
-    accel: &Affine<f64>,
-) -> Option<Vec<Rows>> {
-    let (turns, _) = prepared.turns(accel);
-    let mut factors = Factors::of_turns(&turns);
-    factors.rests(&prepared.rest(accel));
-    factors.list.extend(prepared.magnitudes(accel).list);
-    let triads: [Columns; 2] = [(Sensor::Gyro, gyro, all), (Sensor::Accel, accel, symmetric)];
-    (!turns.is_empty()).then(|| Rows::of_groups(&factors, &triads))
 }
 
 /// Separates the mean square of the first group into what each range of columns explains: bias, matrix and, if there is a third, the accelerometer.

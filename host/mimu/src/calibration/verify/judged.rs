@@ -1,28 +1,20 @@
 //! The judgement of a verification.
 
-use nalgebra::DMatrix;
-
 use super::causes::{Causes, INTERVAL};
 use super::{PowerOn, SensorVerification, Verification};
 use crate::calibration::Calibration;
-use crate::estimate::earth_shared;
-use crate::estimate::least_squares::root;
-use crate::fit::by_rate::variances;
-use crate::fit::predicted::{self, Both};
 use crate::judge::errors::{self, ErrorFigures};
 use crate::judge::input;
 use crate::judgement::{Judgement, JudgementKind};
-use crate::observation::vector;
-use crate::prepared::{Prepared, si_covariance};
-use crate::quantity::{Figure, Sensor, plural};
+use crate::judging::{Both, Judging, known_size};
+use crate::prepared::Prepared;
+use crate::quantity::{Figure, PerSensor, Sensor, plural};
 use crate::recording_problem::RecordingProblem;
 use crate::sessions::class::PartClass;
-use crate::triad::{Covariance, Forward};
-use crate::turntable::RatedDwells;
-use crate::unseen::{Test, Unseen, limit};
+use crate::triad::Covariance;
+use crate::unseen::{Test, limit};
 use crate::warning::Warning;
 use mimu_core::compensation::Affine;
-use mimu_recording::Reference;
 
 /// Gravity of two files that differs by less, m/s², is the same: four decimals are usual.
 const SAME_GRAVITY: f64 = 5e-5;
@@ -48,21 +40,13 @@ impl Causes {
 
 /// Size of the input of `sensor` that `figure` is compared with, in its unit. Infinite if the input is zero throughout.
 fn input_size(prepared: &Prepared, sensor: Sensor, figure: Figure) -> f64 {
-    let size = match figure {
-        Figure::Direction => 1.0,
-        Figure::GravityMagnitude => prepared.manifest.gravity_mps2,
-        Figure::RateMagnitude => {
-            let table = prepared.manifest.turntable.iter();
-            let rates = table.flat_map(|t| &t.rates_dps);
-            rates.fold(0.0, |most, rate| f64::max(most, rate.to_radians()))
-        }
-        Figure::Input => {
-            let all = prepared.observations(sensor);
-            let inputs = all.iter().map(|o| o.without_earth().input);
-            let squares: f64 = inputs.map(|x| x.norm_squared()).sum();
-            (squares / (3 * all.len().max(1)) as f64).sqrt()
-        }
+    let of_inputs = || {
+        let all = prepared.observations(sensor);
+        let inputs = all.iter().map(|o| o.without_earth().input);
+        let squares: f64 = inputs.map(|x| x.norm_squared()).sum();
+        (squares / (3 * all.len().max(1)) as f64).sqrt()
     };
+    let size = known_size(prepared, figure).unwrap_or_else(of_inputs);
     if size > 0.0 { size } else { f64::INFINITY }
 }
 
@@ -92,20 +76,26 @@ fn figures(
 /// of freedom that the biases of other power-ons took.
 pub(super) fn test(
     prepared: &Prepared,
-    sensor: Sensor,
+    judging: &Judging,
     calibration: &Calibration,
     (power_on, taken, causes): (PowerOn, f64, Option<&Causes>),
 ) -> Option<Test> {
-    let covariance = covariance(prepared, sensor, calibration, power_on);
-    let of_errors = of_errors(
-        prepared,
-        sensor,
-        calibration,
-        (power_on, taken, &covariance),
-    )?;
+    let covariance = |sensor| covariance(prepared, sensor, calibration, power_on);
+    if !judging.triads().iter().all(|s| prepared.noise.is_known(*s)) {
+        return None;
+    }
+    let models =
+        PerSensor::from_fn(|s| Some(calibration.inverse(s).unwrap_or_else(Affine::identity)));
+    let both = Both {
+        gyro: covariance(Sensor::Gyro),
+        accel: covariance(Sensor::Accel),
+        follows: Covariance::zeros(),
+    };
+    let unseen = judging.unseen(&models, &both, |_| true)?;
+    let of_errors = Test::of(&[unseen], (f64::INFINITY, 0.0), taken)?;
     // Within a power-on the errors have all that the noise predicts of the biases already.
     let causes = causes.filter(|_| power_on == PowerOn::Another);
-    let of_biases = causes.and_then(|causes| of_biases(causes, &covariance));
+    let of_biases = causes.and_then(|causes| of_biases(causes, &covariance(judging.sensor)));
     Some(match of_biases {
         Some(test) if test.fails() && !of_errors.fails() => Test {
             predicted: of_errors.predicted,
@@ -127,52 +117,6 @@ fn of_biases(causes: &Causes, covariance: &Covariance) -> Option<Test> {
     let count = squares.len();
     let ratio = (squares.iter().sum::<f64>() / count as f64).sqrt();
     (count > 0).then(|| Test::of_ratio(ratio, limit(count as f64), count))
-}
-
-fn of_errors(
-    prepared: &Prepared,
-    sensor: Sensor,
-    calibration: &Calibration,
-    (power_on, taken, covariance): (PowerOn, f64, &Covariance),
-) -> Option<Test> {
-    let model = calibration.inverse(sensor)?;
-    let known = |s: &Sensor| prepared.noise.is_known(*s);
-    let by_turns = prepared.manifest.reference == Reference::Gravity && sensor == Sensor::Gyro;
-    let of = if by_turns {
-        &Sensor::BOTH[..]
-    } else {
-        std::slice::from_ref(&sensor)
-    };
-    if !of.iter().all(known) {
-        return None;
-    }
-    let unseen = match (prepared.manifest.reference, sensor) {
-        (Reference::Table, _) => inputs(prepared, sensor, &model, covariance)?,
-        (Reference::Gravity | Reference::TurntableRate, Sensor::Accel) => {
-            let poses = prepared.observations(Sensor::Accel);
-            let noise = prepared.magnitude_variances(&model, &poses);
-            let g = prepared.manifest.gravity_mps2;
-            predicted::magnitudes(&model, covariance, poses.iter().map(|o| (o, g)), noise)
-        }
-        (Reference::TurntableRate, Sensor::Gyro) => {
-            let dwells = RatedDwells::of(prepared).ok()?;
-            let noise = variances(&model, &dwells.turning);
-            let known = dwells.turning.iter().zip(dwells.magnitudes());
-            predicted::magnitudes(&model, covariance, known, noise)
-        }
-        (Reference::Gravity, Sensor::Gyro) => {
-            let accel = calibration
-                .inverse(Sensor::Accel)
-                .unwrap_or_else(Affine::identity);
-            let both = Both {
-                gyro: *covariance,
-                accel: self::covariance(prepared, Sensor::Accel, calibration, power_on),
-                follows: Covariance::zeros(),
-            };
-            predicted::directions(&prepared.turns(&accel).0, [&model, &accel], &both)
-        }
-    };
-    Test::of(&[unseen], (f64::INFINITY, 0.0), taken)
 }
 
 /// Covariance of C by rows, then o, of `sensor` in this recording: what noise gives, and how biases change between sessions.
@@ -200,32 +144,6 @@ fn covariance(
         }
     }
     covariance
-}
-
-/// Errors at known inputs, three for each dwell.
-fn inputs(
-    prepared: &Prepared,
-    sensor: Sensor,
-    model: &Affine<f64>,
-    covariance: &Covariance,
-) -> Option<Unseen> {
-    let forward = Forward::of(model)?;
-    let all = earth_shared::likely(&prepared.observations(sensor), &forward.matrix);
-    let blocks: Vec<_> = all
-        .iter()
-        .map(|o| vector::at(model, &o.raw, &o.input))
-        .collect();
-    let errors = blocks
-        .iter()
-        .flat_map(|b| <[f64; 3]>::from(b.residual))
-        .collect::<Vec<f64>>();
-    let noise = all
-        .iter()
-        .flat_map(|o| <[f64; 3]>::from(si_covariance(&model.matrix, &o.variance).diagonal()));
-    let noise: Vec<f64> = noise.collect();
-    let by = DMatrix::from_fn(errors.len(), 12, |i, j| blocks[i / 3].by[(i % 3, j)]);
-    let factor = root(&DMatrix::from_column_slice(12, 12, covariance.as_slice()));
-    Some(Unseen::of(errors.into(), noise.into(), &by, &factor))
 }
 
 /// The judgement of the figures of `prepared`; `warnings` are those of the verification.

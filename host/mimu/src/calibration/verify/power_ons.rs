@@ -116,7 +116,7 @@ fn round(
 ) -> Option<(Vec<[Vector3<f64>; 2]>, f64)> {
     let turns = moved.turns(up).0;
     let (mut factors, judged) = match sensor {
-        Sensor::Accel => (moved.magnitudes(model), Observable::Magnitude),
+        Sensor::Accel => (moved.magnitudes(model).0, Observable::Magnitude),
         Sensor::Gyro => {
             let mut factors = Factors::of_turns(&turns);
             factors.rests(&moved.rest(up));
