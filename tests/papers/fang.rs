@@ -3,13 +3,15 @@
 use mimu::estimate::known_input::{kalman, least_squares};
 use mimu::estimate::six_positions::six_positions;
 use mimu::estimate::{EarthShare, Estimated, Observation};
-use mimu::plan::design::schemes::{FANG_FILTERS, Scheme};
 use mimu::quantity::Sensor;
 use mimu::triad::{Angles, Forward, Physical};
 use mimu_core::kalman::Filter;
 use mimu_rig::ideal::{self, FANG_TABLE_3, Ideal};
 use mimu_rig::random::Random;
 use nalgebra::{Matrix3, Vector3};
+
+use crate::FANG_FILTERS;
+use crate::published::Scheme;
 
 use mimu_tests::page::{Block, Table, significant};
 

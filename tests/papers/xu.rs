@@ -2,7 +2,6 @@
 
 use mimu::estimate::known_input::{inverse_form, least_squares, opposite_rates};
 use mimu::estimate::{EarthShare, Estimated, Failure, Observation};
-use mimu::plan::design::schemes::Scheme;
 use mimu::quantity::Sensor;
 use mimu_core::compensation::Affine;
 use mimu_rig::ideal::Inverse;
@@ -10,6 +9,8 @@ use mimu_rig::random::Random;
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
 use mimu_tests::page::{Block, Table, significant};
+
+use crate::published::Scheme;
 
 /// Runs of the Monte Carlo.
 pub const RUNS: u64 = 1000;

@@ -1,10 +1,8 @@
 //! Published calibration schemes, as sequences of settings.
 
+use mimu::plan::design::model::Setting;
+use mimu::quantity::Sensor;
 use nalgebra::Vector3;
-
-use super::model::Setting;
-use crate::quantity::Sensor;
-use mimu_recording::error::{Argument, Error, Result};
 
 /// A published scheme.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -58,7 +56,7 @@ impl Scheme {
         Self::Niu8,
     ];
 
-    /// Name as on the command line.
+    /// Name in tables.
     pub fn name(self) -> &'static str {
         match self {
             Self::SixFace => "six-face",
@@ -79,21 +77,8 @@ impl Scheme {
         dps.map(f64::to_radians)
     }
 
-    /// Assumptions that the published text requires.
-    pub fn assumed(self) -> Option<&'static str> {
-        match self {
-            Self::Niu8 => Some(
-                "the text lacks the figure with the sequence. Of eight quarter turns, only cycles with z down four times and x and y up and down once each reach the five poses and turn both ways about each axis. In these cycles x and y point the same way in all their turns, as in the appendix; z does not",
-            ),
-            Self::XuRates => {
-                Some("rates are fractions of each gyro's range: 300, 300 and 3600 deg/s")
-            }
-            _ => None,
-        }
-    }
-
-    /// The dwells in published order.
-    pub fn settings(self, sensor: Sensor) -> Result<Vec<Setting>> {
+    /// The dwells in published order; `None` if the scheme is for the other sensor.
+    pub fn settings(self, sensor: Sensor) -> Option<Vec<Setting>> {
         let directions: Vec<Vector3<f64>> = match (self, sensor) {
             (Self::SixFace, _) => {
                 let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
@@ -109,37 +94,24 @@ impl Scheme {
                 let z = plane(|c, s| Vector3::new(0.0, -s, -c));
                 [x, y, z].concat()
             }
-            // Quarter turns about y, z, x, z, y, z, x, z. A test enumerates all cycles: 24 fit the text, and all
+            // The text lacks the figure with the sequence. Quarter turns about y, z, x, z, y, z, x, z. A test enumerates all cycles: 24 fit the text, and all
             // have these poses. This is one of the eight with two turns each about x and y.
             (Self::Niu8, Sensor::Accel) => {
                 let (x, y, z) = (Vector3::x(), Vector3::y(), Vector3::z());
                 vec![-z, x, y, -z, -z, -x, -y, -z]
             }
-            (Self::XuRates, Sensor::Gyro) => return Ok(xu_rates()),
-            (Self::Xu33 | Self::Niu8, Sensor::Gyro) => {
-                return self.refuse("of rests, without rates for a gyro", "accel");
+            (Self::XuRates, Sensor::Gyro) => return Some(xu_rates()),
+            (Self::Xu33 | Self::Niu8, Sensor::Gyro) | (Self::XuRates, Sensor::Accel) => {
+                return None;
             }
-            (Self::XuRates, Sensor::Accel) => return self.refuse("of rates", "gyro"),
         };
         let at = |direction: Vector3<f64>| match sensor {
             Sensor::Accel => Setting::at_rest(direction),
             Sensor::Gyro => about(direction, RANGE_DPS),
         };
-        Ok(directions.into_iter().map(at).collect())
-    }
-
-    fn refuse<T>(self, what: &str, sensor: &str) -> Result<T> {
-        Err(Error::new(
-            format!("scheme {}", self.name()),
-            format!("this is a scheme {what}"),
-            format!("use it for the {sensor}"),
-        )
-        .about(Argument::Sensor))
+        Some(directions.into_iter().map(at).collect())
     }
 }
-
-/// Indices into fang, Table 2, of the positions that the filters for x, y and z are given, fang (26)-(28).
-pub const FANG_FILTERS: [[usize; 4]; 3] = [[0, 1, 2, 3], [4, 5, 2, 6], [7, 8, 6, 3]];
 
 /// A rate along `direction`, with the axis upwards that makes the unit point down least: -x is the opposite rate
 /// with x upwards.
