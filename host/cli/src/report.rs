@@ -57,7 +57,7 @@ pub use page::Made;
 pub(crate) use page::problems_text;
 pub(crate) use refusal::{print_refusal, refused};
 pub use sessions::sessions_text;
-pub use thermal::{thermal_comparison_text, thermal_page, thermal_text};
+pub use thermal::{thermal_page, thermal_text};
 pub use thermal_plan::thermal_plan_text;
 #[cfg(not(target_family = "wasm"))]
 pub(crate) use thermal_record::{thermal_progress, thermal_record_text};
