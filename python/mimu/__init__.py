@@ -16,7 +16,7 @@ from importlib.metadata import version as _version
 from mimu import thermal
 from mimu._allan import Allan, Channel, NoiseCoefficient, allan
 from mimu._design import (
-    CoefficientSigma, Design, NextExperiment, ParameterSigma, SchemeComparison, Shown, compare_schemes, design, next_experiment,
+    CoefficientSigma, Design, NextExperiment, ParameterSigma, Shown, design, next_experiment,
 )
 from mimu._diagnosis import Coefficient, Diagnosis, Effect, Leftover, NotExcited, Rejected, SensorDiagnosis, diagnose
 from mimu._error import Error
@@ -33,6 +33,6 @@ __all__ = [
     "Allan", "Biases", "Calibration", "Cause", "Channel", "Coefficient", "CoefficientSigma", "Consistency", "Density", "Design", "Diagnosis", "Dwell",
     "Effect", "Error", "Estimate", "Export", "Figures", "Fit", "Judgement", "Leftover", "Message", "Mounted", "Nees", "NextExperiment", "Noise",
     "NoiseCoefficient", "NoiseInUse", "NotExcited", "Parameter", "ParameterSigma", "Recording", "Rejected", "SchemeComparison",
-    "SensorDiagnosis", "SensorFit", "SensorVerification", "SessionsFit", "Shown", "Verification", "allan", "compare_schemes", "design", "diagnose",
+    "SensorDiagnosis", "SensorFit", "SensorVerification", "SessionsFit", "Shown", "Verification", "allan", "design", "diagnose",
     "export", "fit", "fit_sessions", "load", "load_noise", "next_experiment", "noise_in_use", "read", "thermal", "verify",
 ]

@@ -6,7 +6,7 @@ import os
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 from mimu import _mimu
 from mimu._arguments import arguments
@@ -15,7 +15,6 @@ from mimu._result import Array, Result, typed
 
 Reference = Literal["table", "gravity"]
 Table = Literal["three-axis", "two-axis", "faces", "hand"]
-Order = Literal["shortest", "randomised"]
 
 
 @dataclass(frozen=True)
@@ -64,7 +63,7 @@ class Design(Result):
 
     def to_toml(self) -> str:
         """The plan that ``mimu design -o`` writes, for a table or a person to carry out."""
-        return _plan(self._native)
+        return self._native.plan()
 
     def __str__(self) -> str:
         return self._native.text()
@@ -136,7 +135,7 @@ class NextExperiment(Result):
 
     def to_toml(self) -> str:
         """The plan that ``mimu design --effects -o`` writes, for a table or a person to carry out."""
-        return _plan(self._native)
+        return self._native.plan()
 
     def __str__(self) -> str:
         return self._native.text()
@@ -145,50 +144,17 @@ class NextExperiment(Result):
         return f"<mimu.NextExperiment {self.title}: {len(self.positions)} dwells>"
 
 
-class SchemeComparison(Result):
-    """Published schemes, compared with the best designs of as many dwells."""
-
-    _native: _mimu.Design
-    _questions = ("json", "text", "html", "plan")
-
-    #: Schemes, each followed by the best design.
-    designs: list[dict[str, Any]]
-    #: Names of the schemes that the table cannot carry out.
-    out_of_reach: list[str]
-
-    def __init__(self, native: _mimu.Design) -> None:
-        super().__init__(native)
-        data = self.to_dict()
-        self.designs = data["designs"]
-        self.out_of_reach = data["out_of_reach"]
-
-    def __str__(self) -> str:
-        return self._native.text()
-
-    def __repr__(self) -> str:
-        return "<mimu.SchemeComparison: " + ", ".join(f"{d['title']} {d['d_efficiency']:.3f}" for d in self.designs) + ">"
-
-
-def _plan(native: _mimu.Design) -> str:
-    plan = native.plan()
-    assert plan is not None, "only a comparison has no plan"
-    return plan
-
-
 def design(
     *,
     n: int | None = None,
     budget: float | None = None,
-    scheme: Literal["six-face", "fang-nine", "xu-33", "xu-rates", "niu-8"] | None = None,
     prior: str | os.PathLike[str] | None = None,
     aim: float | None = None,
     target: Sequence[str] | None = None,
     sensor: Literal["gyro", "accel"] = "accel",
     reference: Reference | None = None,
-    model: str | None = None,
     table: Table | None = None,
     dwell: float | None = None,
-    order: Order | None = None,
     rates: str | None = None,
     slew: float | None = None,
     settle: float | None = None,
@@ -198,16 +164,16 @@ def design(
     walk: float | None = None,
     seed: int | None = None,
 ) -> Design:
-    """Designs an experiment, as ``mimu design`` does: the best ``n`` dwells, the best within ``budget`` minutes, or a published ``scheme``.
+    """Designs an experiment, as ``mimu design`` does: the best ``n`` dwells, or the best within ``budget`` minutes.
 
     ``dwell`` and ``settle`` are in seconds, ``slew`` and ``rates`` in deg/s (``"10,100,300"``, or ``"..300"`` for any up to 300), ``sigma``,
-    ``instability``, ``walk`` and a number as ``noise`` in SI; ``noise`` may also be a noise file. ``model`` lists terms: ``"affine,cubic"``.
-    ``prior`` is a file of ``mimu fleet --prior``: poses by hand that count what the population of the unit's kind says; without ``n``, ``budget`` and
-    ``scheme`` as few as meet each ``target`` (``"accel-scale=500"``). ``aim`` is how well a person takes a pose, degrees. The reference is by default ``"table"``, with a prior ``"gravity"``.
+    ``instability``, ``walk`` and a number as ``noise`` in SI; ``noise`` may also be a noise file.
+    ``prior`` is a file of ``mimu fleet --prior``: poses by hand that count what the population of the unit's kind says; without ``n`` and
+    ``budget`` as few as meet each ``target`` (``"accel-scale=500"``). ``aim`` is how well a person takes a pose, degrees. The reference is by default ``"table"``, with a prior ``"gravity"``.
     """
     options = dict(
-        n=n, budget=budget, scheme=scheme, prior=prior, aim=aim, target=target, sensor=sensor, reference=reference, model=model, table=table,
-        dwell=dwell, order=order, rates=rates, slew=slew, settle=settle, sigma=sigma, noise=noise, instability=instability, walk=walk, seed=seed,
+        n=n, budget=budget, prior=prior, aim=aim, target=target, sensor=sensor, reference=reference, table=table,
+        dwell=dwell, rates=rates, slew=slew, settle=settle, sigma=sigma, noise=noise, instability=instability, walk=walk, seed=seed,
     )
     return Design(_mimu.design(arguments(options)))
 
@@ -240,27 +206,3 @@ def next_experiment(
         if isinstance(after, Recording):
             after = after.directory or after.save(os.path.join(folder, "after"))
         return NextExperiment(_mimu.design(arguments({**options, "after": after})))
-
-
-def compare_schemes(
-    *,
-    sensor: Literal["gyro", "accel"] = "accel",
-    reference: Reference = "table",
-    model: str | None = None,
-    table: Table | None = None,
-    dwell: float | None = None,
-    order: Order | None = None,
-    slew: float | None = None,
-    settle: float | None = None,
-    sigma: float | None = None,
-    noise: float | str | os.PathLike[str] | None = None,
-    instability: float | None = None,
-    walk: float | None = None,
-    seed: int | None = None,
-) -> SchemeComparison:
-    """All published schemes and the best designs of as many dwells, as ``mimu design --compare``. The options are those of :func:`mimu.design`."""
-    options = dict(
-        compare=True, sensor=sensor, reference=reference, model=model, table=table, dwell=dwell, order=order, slew=slew, settle=settle,
-        sigma=sigma, noise=noise, instability=instability, walk=walk, seed=seed,
-    )
-    return SchemeComparison(_mimu.design(arguments(options)))

@@ -121,7 +121,6 @@ def fit(
     recordings: Recording | Sequence[Recording],
     *,
     verify: Recording | Sequence[Recording] = (),
-    estimator: Literal["joint", "cubic", "nodes", "ramp-niu", "soak", "soak-fang", "soak-constant-m"] = "joint",
     lag_s: float | None = None,
     range_c: tuple[float, float] | None = None,
     base: CalibrationLike | None = None,
@@ -137,7 +136,7 @@ def fit(
     recordings at rest add the change of the biases; ``at_rest``: the unit lay still throughout.
     """
     covered = None if range_c is None else "..".join(map(str, range_c))
-    options = dict(estimator=estimator, lag=lag_s, range=covered, still=still, steps=steps, at_rest=at_rest)
+    options = dict(lag=lag_s, range=covered, still=still, steps=steps, at_rest=at_rest)
     return ThermalFit(
         _mimu.thermal_fit(
             several(recordings), arguments(options), verify=several(verify, "verify"), base=None if base is None else calibration_of(base, "base"),

@@ -9,11 +9,11 @@ use pyo3::prelude::*;
 use crate::error::refused;
 use crate::work::{done, json};
 
-/// A designed experiment, or several.
+/// A designed experiment.
 #[pyclass(frozen, module = "mimu._mimu")]
 pub(crate) struct Design {
     made: Designed,
-    plan: Option<String>,
+    plan: String,
 }
 
 #[pymethods]
@@ -34,8 +34,8 @@ impl Design {
     }
 
     /// The plan for a table or a person, as `mimu design -o` writes it.
-    fn plan(&self) -> Option<&str> {
-        self.plan.as_deref()
+    fn plan(&self) -> &str {
+        &self.plan
     }
 }
 

@@ -44,15 +44,11 @@ OF_FILES = {"json", "strict", "verbose", "replace", "force"}
         # Destinations of the result; the short options of the faces are in `faces`.
         (mimu.read, "import", {"json", "o", "x", "y", "z"}),
         # Results other than a design, and the options for these only.
-        (mimu.design, "design", {"json", "o", "compare", "effects", "after", "chamber", "verbose"}),
-        (
-            mimu.compare_schemes, "design",
-            {"json", "o", "compare", "effects", "after", "chamber", "verbose", "n", "budget", "scheme", "rates", "prior", "aim", "target"},
-        ),
+        (mimu.design, "design", {"json", "o", "effects", "after", "chamber", "verbose"}),
         (
             mimu.next_experiment, "design",
             {
-                "json", "o", "compare", "verbose", "n", "budget", "scheme", "model", "sigma", "instability", "walk", "order", "sensor", "prior", "aim",
+                "json", "o", "verbose", "n", "budget", "sigma", "instability", "walk", "sensor", "prior", "aim",
                 "target",
             },
         ),

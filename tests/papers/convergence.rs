@@ -1,6 +1,5 @@
 //! fang, Figs. 8 to 15: the bank of filters (26) to (28) while the readings come in, with the calibration of Table 4 and the noise of Table 5 at 25 °C.
 
-use mimu::plan::design::schemes::{FANG_FILTERS, Scheme};
 use mimu::quantity::Sensor;
 use mimu::triad::{Angles, Forward, Physical, Triad};
 use mimu_core::kalman::Filter;
@@ -9,7 +8,9 @@ use mimu_rig::random::Random;
 use mimu_tests::page::{Block, Table, significant};
 use nalgebra::{Matrix3, Vector3};
 
+use crate::FANG_FILTERS;
 use crate::plot::{Figure, Line, Panel};
+use crate::published::Scheme;
 
 /// Readings a second, and readings of each position: two seconds, after which the paper has its results.
 const RATE_HZ: usize = 1000;

@@ -2,14 +2,15 @@
 
 use mimu::estimate::known_input::least_squares;
 use mimu::estimate::{EarthShare, Observation};
-use mimu::plan::design::schemes::{FANG_FILTERS, Scheme};
 use mimu::quantity::Sensor;
 use mimu::triad::{Angles, Forward, Physical};
 use mimu_rig::ideal::{self, FANG_TABLE_3, Ideal};
 use mimu_rig::random::Random;
 use nalgebra::{Matrix3, Vector3};
 
-use crate::published::{kalman, six_positions};
+use crate::FANG_FILTERS;
+use crate::estimators::{kalman, six_positions};
+use crate::published::Scheme;
 use mimu_tests::page::{Block, Table, significant};
 
 /// Runs of the Monte Carlo.

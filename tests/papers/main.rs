@@ -4,6 +4,7 @@
 //! document. The check omits the intervals, which take longest and have their own tests; `papers --keep-intervals` writes everything else.
 
 mod convergence;
+mod estimators;
 mod fang;
 mod intervals;
 mod niu;
@@ -16,6 +17,9 @@ mod xu_table_3;
 use std::process::ExitCode;
 
 use mimu_tests::page::{self, Pages};
+
+/// Indices into fang, Table 2, of the positions that the filters for x, y and z are given, fang (26)-(28).
+const FANG_FILTERS: [[usize; 4]; 3] = [[0, 1, 2, 3], [4, 5, 2, 6], [7, 8, 6, 3]];
 
 /// The pages with places for figures.
 const PAGES: [&str; 4] = [

@@ -1,106 +1,141 @@
-//! The estimators of the papers as they are published, for comparison with least squares.
+//! Published calibration schemes, as sequences of settings.
 
-use mimu::estimate::Observation;
-use mimu::estimate::known_input::least_squares;
-use mimu::triad::Forward;
-use mimu_core::compensation::Affine;
-use mimu_core::kalman::Filter;
-use nalgebra::{DMatrix, Matrix3, Vector3};
+use mimu::plan::design::model::Setting;
+use mimu::quantity::Sensor;
+use nalgebra::Vector3;
 
-/// An estimator of an inverse model.
-pub type Estimator = fn(&[Observation]) -> Affine<f64>;
-
-/// Least squares of `mimu`, in the inverse direction.
-pub fn inverse_by_least_squares(dwells: &[Observation]) -> Affine<f64> {
-    let found = least_squares(dwells, &[], None).expect("determined");
-    found.triad.inverse
+/// A published scheme.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Scheme {
+    /// Each axis up and down: reference 5 of fang.
+    SixFace,
+    /// The nine positions of fang, Table 2.
+    FangNine,
+    /// The 33 accelerometer positions of xu, appendix: eleven attitudes in each of three half planes.
+    Xu33,
+    /// The rates of xu, 2.2.1: 9, 9 and 11 rates in both directions about x, y and z, and rest with each
+    /// upwards.
+    XuRates,
+    /// The eight dwells of niu, 3.2, on a two-axis table.
+    Niu8,
 }
 
-/// The classical six positions: scale factor `(u⁺ - u⁻) / (x⁺ - x⁻)` and bias of each sensor from the two inputs along it, without misalignments.
-pub fn six_positions(dwells: &[Observation]) -> Forward {
-    let mut found = Forward {
-        matrix: Matrix3::zeros(),
-        bias: Vector3::zeros(),
-    };
-    for axis in 0..3 {
-        let [up, down] = [1.0, -1.0].map(|sign| {
-            let own = dwells.iter().find(|o| sign * o.input[axis] > 0.9);
-            own.expect("six faces")
-        });
-        let scale = (up.raw[axis] - down.raw[axis]) / (up.input[axis] - down.input[axis]);
-        found.matrix[(axis, axis)] = scale;
-        found.bias[axis] =
-            0.5 * (up.raw[axis] + down.raw[axis] - scale * (up.input[axis] + down.input[axis]));
-    }
-    found
-}
+/// Positions in the order of fang, Table 2, not normalised.
+const FANG: [[f64; 3]; 9] = [
+    [1.0, 0.0, 0.0],
+    [-1.0, 0.0, 0.0],
+    [1.0, 1.0, 0.0],
+    [1.0, 0.0, 1.0],
+    [0.0, 1.0, 0.0],
+    [0.0, -1.0, 0.0],
+    [0.0, 1.0, 1.0],
+    [0.0, 0.0, 1.0],
+    [0.0, 0.0, -1.0],
+];
 
-/// fang (23)-(28): a filter for each axis, fed the dwells that are chosen for it.
-pub fn kalman(dwells: &[Observation], chosen: &[Vec<usize>; 3]) -> Forward {
-    let mut found = Forward {
-        matrix: Matrix3::zeros(),
-        bias: Vector3::zeros(),
-    };
-    for (axis, chosen) in chosen.iter().enumerate() {
-        let mut filter = Filter::<f64>::diffuse(dwells[0].variance[axis], 1.0);
-        for &k in chosen {
-            let o = &dwells[k];
-            filter
-                .update(&o.input, o.raw[axis], o.variance[axis])
-                .expect("finite");
-        }
-        let mean = filter.mean();
-        found.bias[axis] = mean[0];
-        for j in 0..3 {
-            found.matrix[(axis, j)] = mean[j + 1];
-        }
-    }
-    found
-}
+/// Rates about x and y, and about z, deg/s: xu, appendix.
+const XU_XY_DPS: [f64; 9] = [6.0, 12.0, 24.0, 30.0, 60.0, 120.0, 180.0, 240.0, 300.0];
+const XU_Z_DPS: [f64; 11] = [
+    10.0, 40.0, 100.0, 240.0, 400.0, 720.0, 1000.0, 1800.0, 2160.0, 2880.0, 3600.0,
+];
+/// Angles of each half plane, degrees: xu, 2.2.2.
+const XU_DEG: [f64; 11] = [
+    0.0, 15.0, 30.0, 45.0, 60.0, 90.0, 120.0, 135.0, 150.0, 165.0, 180.0,
+];
 
-/// xu (3)-(11): C from the differences of opposite rates, o from the readings at rest.
-pub fn opposite_rates(dwells: &[Observation]) -> Affine<f64> {
-    let mut free: Vec<&Observation> = dwells.iter().collect();
-    let (mut pairs, mut rest) = (Vec::new(), Vec::new());
-    while let Some(first) = free.pop() {
-        let sum = |o: &&Observation| (o.input + first.input).norm();
-        match free.iter().position(|o| sum(o) < 1e-9) {
-            _ if first.input.norm() < 1e-9 => rest.push(first),
-            Some(opposite) => pairs.push((first, free.swap_remove(opposite))),
-            None => {}
+/// Largest rate where a scheme leaves it open, deg/s: the range of fang's gyros.
+const RANGE_DPS: f64 = 300.0;
+
+impl Scheme {
+    /// All of them.
+    pub const ALL: [Self; 5] = [
+        Self::SixFace,
+        Self::FangNine,
+        Self::Xu33,
+        Self::XuRates,
+        Self::Niu8,
+    ];
+
+    /// Name in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::SixFace => "six-face",
+            Self::FangNine => "fang-nine",
+            Self::Xu33 => "xu-33",
+            Self::XuRates => "xu-rates",
+            Self::Niu8 => "niu-8",
         }
     }
-    let differences = |of: fn(&Observation) -> Vector3<f64>| {
-        DMatrix::from_fn(pairs.len(), 3, |i, j| of(pairs[i].0)[j] - of(pairs[i].1)[j])
-    };
-    let matrix = regression(&differences(|o| o.raw), &differences(|o| o.input));
-    let at_rest = rest.iter().map(|o| o.raw).sum::<Vector3<f64>>() / rest.len() as f64;
-    Affine {
-        offset: -matrix * at_rest,
-        matrix,
+
+    /// Full rate along x, y, z, rad/s: the rates of the scheme are shares of it.
+    pub fn rate_span(self) -> Vector3<f64> {
+        let dps = match self {
+            // Its z gyro has twelve times the range of the others.
+            Self::XuRates => Vector3::new(300.0, 300.0, 3600.0),
+            _ => Vector3::repeat(RANGE_DPS),
+        };
+        dps.map(f64::to_radians)
+    }
+
+    /// The dwells in published order; `None` if the scheme is for the other sensor.
+    pub fn settings(self, sensor: Sensor) -> Option<Vec<Setting>> {
+        let directions: Vec<Vector3<f64>> = match (self, sensor) {
+            (Self::SixFace, _) => {
+                let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
+                axes.into_iter().flat_map(|a| [a, -a]).collect()
+            }
+            (Self::FangNine, _) => FANG.map(Vector3::from).to_vec(),
+            (Self::Xu33, Sensor::Accel) => {
+                let plane = |at: fn(f64, f64) -> Vector3<f64>| {
+                    XU_DEG.map(|deg| at(deg.to_radians().cos(), deg.to_radians().sin()))
+                };
+                let x = plane(|c, s| Vector3::new(-c, 0.0, -s));
+                let y = plane(|c, s| Vector3::new(-s, -c, 0.0));
+                let z = plane(|c, s| Vector3::new(0.0, -s, -c));
+                [x, y, z].concat()
+            }
+            // The text lacks the figure with the sequence. Quarter turns about y, z, x, z, y, z, x, z. A test enumerates all cycles: 24 fit the text, and all
+            // have these poses. This is one of the eight with two turns each about x and y.
+            (Self::Niu8, Sensor::Accel) => {
+                let (x, y, z) = (Vector3::x(), Vector3::y(), Vector3::z());
+                vec![-z, x, y, -z, -z, -x, -y, -z]
+            }
+            (Self::XuRates, Sensor::Gyro) => return Some(xu_rates()),
+            (Self::Xu33 | Self::Niu8, Sensor::Gyro) | (Self::XuRates, Sensor::Accel) => {
+                return None;
+            }
+        };
+        let at = |direction: Vector3<f64>| match sensor {
+            Sensor::Accel => Setting::at_rest(direction),
+            Sensor::Gyro => about(direction, RANGE_DPS),
+        };
+        Some(directions.into_iter().map(at).collect())
     }
 }
 
-/// xu (12)-(16): C and o by least squares of the known forces over the readings.
-pub fn inverse_form(dwells: &[Observation]) -> Affine<f64> {
-    let n = dwells.len();
-    let mean = |of: fn(&Observation) -> Vector3<f64>| {
-        dwells.iter().map(of).sum::<Vector3<f64>>() / n as f64
-    };
-    let (raw, input) = (mean(|o| o.raw), mean(|o| o.input));
-    let about = |of: fn(&Observation) -> Vector3<f64>, mean: Vector3<f64>| {
-        DMatrix::from_fn(n, 3, |i, j| of(&dwells[i])[j] - mean[j])
-    };
-    let matrix = regression(&about(|o| o.raw, raw), &about(|o| o.input, input));
-    Affine {
-        offset: input - matrix * raw,
-        matrix,
+/// A rate along `direction`, with the axis upwards that makes the unit point down least: -x is the opposite rate
+/// with x upwards.
+fn about(direction: Vector3<f64>, rate_dps: f64) -> Setting {
+    let rate = rate_dps.to_radians();
+    let down = direction.sum() < 0.0;
+    Setting {
+        up: if down { -direction } else { direction }.normalize(),
+        rate: if down { -rate } else { rate },
     }
 }
 
-/// The matrix that makes `known` of `readings`, row by row, in the sense of least squares.
-fn regression(readings: &DMatrix<f64>, known: &DMatrix<f64>) -> Matrix3<f64> {
-    let normal = readings.tr_mul(readings).try_inverse().expect("regular");
-    let transposed = normal * readings.tr_mul(known);
-    Matrix3::from_fn(|i, j| transposed[(j, i)])
+fn xu_rates() -> Vec<Setting> {
+    let mut settings = Vec::new();
+    let axes: [(Vector3<f64>, &[f64]); 3] = [
+        (Vector3::x(), &XU_XY_DPS),
+        (Vector3::y(), &XU_XY_DPS),
+        (Vector3::z(), &XU_Z_DPS),
+    ];
+    for (axis, rates) in axes {
+        settings.push(Setting::at_rest(axis));
+        for rate in rates {
+            settings.extend([about(axis, *rate), about(-axis, *rate)]);
+        }
+    }
+    settings
 }

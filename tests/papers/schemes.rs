@@ -2,13 +2,14 @@
 
 use mimu::plan::design::Problem;
 use mimu::plan::design::judgement::Judgement;
-use mimu::plan::design::model::{Model, Setting, Terms};
+use mimu::plan::design::model::Setting;
 use mimu::plan::design::reach::{Fixture, Rates};
-use mimu::plan::design::schemes::Scheme;
 use mimu::quantity::Sensor;
 use mimu_recording::Reference;
 
 use mimu_tests::page::{Block, Table, significant};
+
+use crate::published::Scheme;
 
 /// Sigmas of the parameters that `belongs` selects: one number, or the lowest and the highest.
 fn sigmas(judged: &Judgement, belongs: impl Fn(&str) -> bool) -> String {
@@ -49,7 +50,7 @@ fn table(problem: &Problem, sensor: Sensor, sizes: &[usize]) -> Table {
         ]);
     };
     for scheme in Scheme::ALL {
-        if let Ok(settings) = scheme.settings(sensor) {
+        if let Some(settings) = scheme.settings(sensor) {
             line(scheme.name().to_string(), &settings);
         }
     }
@@ -62,10 +63,9 @@ fn table(problem: &Problem, sensor: Sensor, sizes: &[usize]) -> Table {
 
 /// Tables for the accelerometer and for the gyro.
 pub fn blocks() -> Vec<Block> {
-    let accel = Model::accel(Reference::Table, &Terms::default());
-    let accel = Problem::accel(accel, Fixture::ThreeAxis).expect("determined");
-    let gyro = Model::gyro(&Terms::default(), Scheme::XuRates.rate_span());
-    let gyro = Problem::gyro(gyro, Fixture::ThreeAxis, Rates::Any).expect("determined");
+    let accel = Problem::accel(Reference::Table, Fixture::ThreeAxis).expect("determined");
+    let span = Scheme::XuRates.rate_span();
+    let gyro = Problem::gyro(span, Fixture::ThreeAxis, Rates::Any).expect("determined");
     vec![
         Block::table(
             "schemes, poses known",

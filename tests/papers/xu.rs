@@ -1,14 +1,14 @@
 //! xu: its schedules, Tables 1 and 2 as truth, and the scatter of its five repeats as noise.
 
 use mimu::estimate::{EarthShare, Observation};
-use mimu::plan::design::schemes::Scheme;
 use mimu::quantity::Sensor;
 use mimu_core::compensation::Affine;
 use mimu_rig::ideal::Inverse;
 use mimu_rig::random::Random;
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
-use crate::published::{Estimator, inverse_by_least_squares, inverse_form, opposite_rates};
+use crate::estimators::{Estimator, inverse_by_least_squares, inverse_form, opposite_rates};
+use crate::published::Scheme;
 use mimu_tests::page::{Block, Table, significant};
 
 /// Runs of the Monte Carlo.

@@ -10,8 +10,7 @@ use mimu::triad::Triad;
 use mimu_recording::Recording;
 use mimu_rig::random::Random;
 use mimu_rig::rig_file::{AffineFile, RigFile};
-use mimu_thermal::classic::Classic;
-use mimu_thermal::fit::{Estimator, ThermalFit};
+use mimu_thermal::fit::ThermalFit;
 use mimu_thermal::session::Session;
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -32,21 +31,18 @@ pub enum Experiment {
     Fibre,
     /// niu's scheme while the temperature rises and falls, all curves together.
     Ramp,
-    /// The same by niu's own computation.
-    RampNiu,
 }
 
 impl Experiment {
     /// All of them.
-    pub const ALL: [Self; 4] = [Self::Table, Self::Fibre, Self::Ramp, Self::RampNiu];
+    pub const ALL: [Self; 3] = [Self::Table, Self::Fibre, Self::Ramp];
 
     /// Name in tables.
     pub fn name(self) -> &'static str {
         match self {
             Self::Table => "table",
             Self::Fibre => "fibre gyro, six exact turns",
-            Self::Ramp => "ramp, joint",
-            Self::RampNiu => "ramp-niu",
+            Self::Ramp => "ramp",
         }
     }
 
@@ -55,7 +51,7 @@ impl Experiment {
         match self {
             Self::Table => 0.3,
             Self::Fibre => 0.01,
-            Self::Ramp | Self::RampNiu => 0.15,
+            Self::Ramp => 0.15,
         }
     }
 
@@ -64,7 +60,7 @@ impl Experiment {
         match self {
             Self::Table => 100.0,
             Self::Fibre => 0.5,
-            Self::Ramp | Self::RampNiu => 20.0,
+            Self::Ramp => 20.0,
         }
     }
 }
@@ -144,7 +140,7 @@ pub fn plan(experiment: Experiment, latitude_deg: f64, random: &mut Random) -> S
                 );
             }
         }
-        Experiment::Ramp | Experiment::RampNiu => {
+        Experiment::Ramp => {
             let _ = writeln!(
                 plan,
                 "chamber_c = [[0.0, 10.0], [200.0, 10.0], [1700.0, 50.0], [3200.0, 10.0]]\nlead_in_s = 5.0\nrounds = 20"
@@ -193,11 +189,7 @@ pub fn run(experiment: Experiment, latitude_known: bool, seed: u64) -> Errors {
     let prepared = Prepared::read(&recording, STILL_FACTOR, |_| ()).expect("readable");
     match experiment {
         Experiment::Table | Experiment::Fibre => of_fit(&fitted(prepared), &bias),
-        Experiment::Ramp => of_ramp(&ramp(&prepared, Estimator::Joint), &bias),
-        Experiment::RampNiu => of_ramp(
-            &ramp(&prepared, Estimator::Classic(Classic::RampNiu)),
-            &bias,
-        ),
+        Experiment::Ramp => of_ramp(&ramp(&prepared), &bias),
     }
 }
 
@@ -230,10 +222,9 @@ fn errors(triad: &Triad, bias: &Vector3<f64>) -> Vec<[f64; 3]> {
     (0..3).map(error).collect()
 }
 
-fn ramp(prepared: &Prepared, estimator: Estimator) -> ThermalFit {
+fn ramp(prepared: &Prepared) -> ThermalFit {
     let session = Session::of(prepared).expect("a session");
     let options = mimu_thermal::fit::Options {
-        estimator,
         lag_s: Some(0.0),
         range_c: None,
     };

@@ -6,7 +6,6 @@ use std::sync::Arc;
 use mimu::fit::{Fit, Options, fit};
 use mimu::plan::design::Problem;
 use mimu::plan::design::budget::DwellNoise;
-use mimu::plan::design::model::{Model, Terms};
 use mimu::plan::design::population::Population;
 use mimu::plan::design::reach::Fixture;
 use mimu::prior::Prior;
@@ -292,8 +291,7 @@ impl Promise {
         let [shortest, longest] = HandsTruth::default().pause_s;
         let sigma = noise.sigma(DWELL_S + shortest + longest);
         let population = Population::of(prior, "prior.toml").expect("a population");
-        let model = Model::accel(Reference::Gravity, &Terms::default());
-        let problem = Problem::accel(model, Fixture::Hand).expect("determined");
+        let problem = Problem::accel(Reference::Gravity, Fixture::Hand).expect("determined");
         let problem = problem
             .beside(population, sigma, aim_deg.to_radians())
             .expect("by hand");

@@ -17,7 +17,6 @@ use mimu::triad::Triad;
 use mimu_recording::WholeTurns;
 use mimu_recording::error::Result;
 use mimu_rig::rig_file::{EffectFile, RigFile};
-use mimu_thermal::fit::Estimator;
 use mimu_thermal::session::Session;
 use nalgebra::SVector;
 
@@ -253,12 +252,7 @@ impl Kind {
             }
             Setting::Ramp => {
                 let session = Session::of(&recordings[0])?;
-                let options = mimu_thermal::fit::Options {
-                    estimator: Estimator::Joint,
-                    lag_s: None,
-                    range_c: None,
-                };
-                let fitted = mimu_thermal::fit::fit(vec![session], &[], options)?;
+                let fitted = mimu_thermal::fit::fit(vec![session], &[], Default::default())?;
                 let at = |temp_c: f64| {
                     let of = |s| fitted.joint.curves[s].as_ref()?.triad(temp_c);
                     (Some(temp_c), Sensor::BOTH.map(of))

@@ -13,7 +13,7 @@ use mimu_rig::record::samples;
 use mimu_rig::rig_file::{RigFile, RigTruth};
 use mimu_tests::niu::{Row, TABLE_10, TABLE_11};
 use mimu_tests::page::{Block, Table};
-use mimu_thermal::fit::{Estimator, Options, fit};
+use mimu_thermal::fit::{Options, fit};
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
@@ -56,12 +56,7 @@ pub fn blocks(_runs: u64) -> Vec<Block> {
     for (name, rig, printed) in UNITS_TESTED {
         let file = unit(&on_board(&read(&format!("rigs/{rig}.toml"))), 1);
         let recorded = session(&read("plans/niu-ramp.toml"), &file, 1);
-        let options = Options {
-            estimator: Estimator::Joint,
-            lag_s: None,
-            range_c: None,
-        };
-        let found = fit(vec![recorded], &[], options).expect("it is fitted");
+        let found = fit(vec![recorded], &[], Options::default()).expect("it is fitted");
         let calibration = found
             .calibration("2026-01-01T00:00:00Z")
             .expect("it has scale factors");

@@ -5,13 +5,12 @@ use mimu::triad::Forward;
 use mimu_core::compensation::Affine;
 use mimu_rig::rig_file::RigFile;
 use mimu_tests::page::{Block, Table};
-use mimu_thermal::classic::Classic;
-use mimu_thermal::fit::{Estimator, Options, fit};
-use mimu_thermal::joint::Joint;
+use mimu_thermal::joint::{self, Choice, Joint};
 use mimu_thermal::session::Session;
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
+use crate::classic::{self, Classic};
 use crate::on_bench::{noiseless, read, rms, session, unit};
 
 /// Steps of a round: six faces, then six rates.
@@ -30,14 +29,15 @@ enum Model {
     OneTemperature,
 }
 
+/// Name, estimator (`None`: the joint one), and how its curves are used.
 #[rustfmt::skip]
-const ROWS: [(&str, Estimator, Model); 6] = [
-    ("all 18 scalars of a triad, at one temperature", Estimator::Classic(Classic::Soak), Model::OneTemperature),
-    ("(33), (34) as printed (`soak-fang`)", Estimator::Classic(Classic::SoakAsPrinted), Model::AsFitted),
-    ("the same, with M of one temperature", Estimator::Classic(Classic::SoakAsPrinted), Model::WithM),
-    ("(31), (32) with M constant (`soak-constant-m`)", Estimator::Classic(Classic::SoakConstantM), Model::AsFitted),
-    ("all 18 scalars of each plateau (`soak`)", Estimator::Classic(Classic::Soak), Model::AsFitted),
-    ("`joint`", Estimator::Joint, Model::AsFitted),
+const ROWS: [(&str, Option<Classic>, Model); 6] = [
+    ("all 18 scalars of a triad, at one temperature", Some(Classic::Soak), Model::OneTemperature),
+    ("(33), (34) as printed", Some(Classic::SoakAsPrinted), Model::AsFitted),
+    ("the same, with M of one temperature", Some(Classic::SoakAsPrinted), Model::WithM),
+    ("(31), (32) with M constant", Some(Classic::SoakConstantM), Model::AsFitted),
+    ("all 18 scalars of each plateau", Some(Classic::Soak), Model::AsFitted),
+    ("`mimu thermal fit`", None, Model::AsFitted),
 ];
 
 /// Errors of one run: accelerometer with z up, on all faces, gyro on the faces, gyro at rates.
@@ -93,17 +93,15 @@ fn table(runs: u64, plan: &str, file: &RigFile, truth: &Session) -> Table {
 }
 
 fn once(noisy: &Session, truth: &Session) -> Vec<Errors> {
-    let by = |estimator| {
-        let options = Options {
-            estimator,
-            lag_s: None,
-            range_c: None,
-        };
-        fit(vec![noisy.clone()], &[], options)
-            .expect("it is fitted")
-            .joint
+    let by = |classic: Option<Classic>| {
+        let sessions = [noisy.clone()];
+        match classic {
+            Some(classic) => classic::estimate(&sessions, classic),
+            None => joint::estimate(&sessions, Choice::JOINT),
+        }
+        .expect("it is fitted")
     };
-    let soak = by(Estimator::Classic(Classic::Soak));
+    let soak = by(Some(Classic::Soak));
     let each = ROWS
         .iter()
         .map(|(_, estimator, model)| errors(&by(*estimator), &soak, *model, truth));

@@ -13,11 +13,13 @@
 //! | `planned [RUNS]` | what `mimu thermal plan --procedure ramp` promises |
 //! | `write [COMMAND ...]` | these tables, or all, into the pages, each with the number of runs of the pages |
 
+mod classic;
 mod compensation;
 mod dies;
 mod fang;
 mod on_bench;
 mod planned;
+mod points;
 mod repeatability;
 mod side_by_side;
 mod simulation;

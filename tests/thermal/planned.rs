@@ -4,8 +4,7 @@ use mimu::plan::design::budget::DwellNoise;
 use mimu::quantity::Sensor;
 use mimu_tests::page::{Block, Table};
 use mimu_thermal::basis::Shape;
-use mimu_thermal::fit::{Estimator, Options, fit};
-use mimu_thermal::joint::Joint;
+use mimu_thermal::joint::{Choice, Joint, estimate};
 use mimu_thermal::plan::{Procedure, Request, plan, to_toml};
 use nalgebra::SVector;
 use rayon::prelude::*;
@@ -54,16 +53,11 @@ pub fn blocks(runs: u64) -> Vec<Block> {
         (axes.white_si, axes.instability_si, axes.walk_si) =
             (Some([noise.n; 3]), Some([noise.b; 3]), Some([noise.k; 3]));
     }
-    let by = |session| {
-        let options = Options {
-            estimator: Estimator::Cubic,
-            lag_s: None,
-            range_c: None,
-        };
-        fit(vec![session], &[], options)
-            .expect("it is fitted")
-            .joint
+    let choice = Choice {
+        shape: Shape::Cubic,
+        lag_s: None,
     };
+    let by = |session| estimate(&[session], choice).expect("it is fitted");
     let each = (0..runs)
         .into_par_iter()
         .map(|k| by(session(&text, &file, 100 + k)));

@@ -10,12 +10,11 @@ use mimu_rig::rig_file::RigFile;
 use mimu_tests::niu::{Row, TABLE_4, TABLE_6};
 use mimu_tests::page::{Block, Table, significant};
 use mimu_thermal::basis::Shape;
-use mimu_thermal::classic::Classic;
-use mimu_thermal::fit::{Estimator, Options, fit};
 use mimu_thermal::plan::{Procedure, Request, plan, to_toml};
 use nalgebra::SVector;
 use rayon::prelude::*;
 
+use crate::classic::{Classic, estimate};
 use crate::on_bench::{read, session, unit};
 
 /// Place of the table in the document.
@@ -168,7 +167,7 @@ pub fn blocks(_: u64) -> Vec<Block> {
     vec![Block::table(NAMES[0], &table)]
 }
 
-/// Estimates of the soak, by `soak`, and of the three ramps, by `ramp-niu`.
+/// Estimates of the soak, each plateau fitted, and of the three ramps, by niu's own computation.
 fn recorded(file: &RigFile, unstable: Option<&Unstable>) -> (Curves, Vec<Curves>) {
     let each = (0..=PROFILES.len()).into_par_iter().map(|k| {
         let (request, classic) = match k.checked_sub(1) {
@@ -183,14 +182,9 @@ fn recorded(file: &RigFile, unstable: Option<&Unstable>) -> (Curves, Vec<Curves>
         assert!(text.contains("latitude_deg"), "{text:.300}");
         let powered = unstable.map_or_else(|| file.clone(), |u| power_on(file, u, k as u64));
         let recorded = session(&text, &powered, 10 + k as u64);
-        let options = Options {
-            estimator: Estimator::Classic(classic),
-            lag_s: None,
-            range_c: None,
-        };
-        let found = fit(vec![recorded], &[], options).expect("it is fitted");
+        let found = estimate(&[recorded], classic).expect("it is fitted");
         curves(file, |sensor, temp_c| {
-            let curves = found.joint.curves[Sensor::BOTH[sensor]]
+            let curves = found.curves[Sensor::BOTH[sensor]]
                 .as_ref()
                 .expect("recorded");
             let [model, _] = curves.forward(temp_c);

@@ -4,11 +4,12 @@ use mimu::prepared::Prepared;
 use mimu::signal::stillness::STILL_FACTOR;
 use mimu_recording::{Batch, Manifest};
 use mimu_tests::page::{Block, Table};
-use mimu_thermal::classic::Classic;
-use mimu_thermal::fit::{Estimator, Options, fit};
+use mimu_thermal::basis::Shape;
+use mimu_thermal::joint::{Choice, estimate};
 use mimu_thermal::session::Session;
 use rayon::prelude::*;
 
+use crate::classic::{self, Classic};
 use crate::simulation::Experiment;
 use crate::soak;
 use crate::study::{Errors, bound, rms, shares};
@@ -16,18 +17,29 @@ use crate::study::{Errors, bound, rms, shares};
 /// Lag of the dies, s.
 const LAG_S: f64 = 60.0;
 
-/// Name, estimator, and whether its lag is given as zero.
-type Row = (&'static str, Estimator, bool);
+/// An estimator.
+#[derive(Clone, Copy)]
+enum Estimator {
+    Joint(Choice),
+    Classic(Classic),
+}
+
+/// Name and estimator.
+type Row = (&'static str, Estimator);
+
+const fn joint(shape: Shape, lag_s: Option<f64>) -> Estimator {
+    Estimator::Joint(Choice { shape, lag_s })
+}
 
 const ON_SOAK: [Row; 2] = [
-    ("`soak`", Estimator::Classic(Classic::Soak), false),
-    ("`joint`", Estimator::Joint, false),
+    ("each plateau", Estimator::Classic(Classic::Soak)),
+    ("`mimu thermal fit`", joint(Shape::Spline, None)),
 ];
 const ON_RAMP: [Row; 4] = [
-    ("`joint`", Estimator::Joint, false),
-    ("`joint --lag 0`", Estimator::Joint, true),
-    ("`cubic`", Estimator::Cubic, false),
-    ("`ramp-niu`", Estimator::Classic(Classic::RampNiu), false),
+    ("`mimu thermal fit`", joint(Shape::Spline, None)),
+    ("the same, `--lag 0`", joint(Shape::Spline, Some(0.0))),
+    ("the same with cubics", joint(Shape::Cubic, None)),
+    ("niu's", Estimator::Classic(Classic::RampNiu)),
 ];
 
 /// Place of the table in the document.
@@ -68,15 +80,14 @@ fn table(
         let (manifest, batch) = record(seed);
         let prepared = Prepared::of(manifest, &batch, STILL_FACTOR).expect("it is prepared");
         let session = Session::of(&prepared).expect("its thermometer works");
-        let by = |(_, estimator, no_lag): &Row| {
-            let options = Options {
-                estimator: *estimator,
-                lag_s: no_lag.then_some(0.0),
-                range_c: None,
+        let by = |(_, estimator): &Row| {
+            let sessions = [session.clone()];
+            let found = match *estimator {
+                Estimator::Joint(choice) => estimate(&sessions, choice),
+                Estimator::Classic(classic) => classic::estimate(&sessions, classic),
             };
-            let found = fit(vec![session.clone()], &[], options);
             found
-                .map(|f| Errors::of(&f.joint.curves))
+                .map(|joint| Errors::of(&joint.curves))
                 .map_err(|e| e.to_string())
         };
         rows.iter().map(by).collect::<Vec<_>>()

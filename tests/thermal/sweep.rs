@@ -10,7 +10,7 @@ use mimu_allan::model::FLOOR;
 use mimu_allan::variance::AllanModel;
 use mimu_rig::rig_file::RigFile;
 use mimu_tests::page::{Block, Table};
-use mimu_thermal::fit::{Estimator, Options, ThermalFit, fit};
+use mimu_thermal::fit::{Options, ThermalFit, fit};
 use mimu_thermal::row::Row;
 use nalgebra::{Matrix4, Matrix4x3, SVector};
 use rayon::prelude::*;
@@ -111,12 +111,7 @@ fn once(plan: &str, rig: &str, stated: bool, seed: u64) -> Outcome {
     if stated {
         recorded.noise_at_rest = at_rest(&file, seed);
     }
-    let options = Options {
-        estimator: Estimator::Joint,
-        lag_s: None,
-        range_c: None,
-    };
-    match fit(vec![recorded], &[], options) {
+    match fit(vec![recorded], &[], Options::default()) {
         Err(refused) => {
             eprintln!("seed {seed}: refused: {refused}");
             Outcome {

@@ -1,7 +1,7 @@
 //! The poses of a recording, and how much each further pose would improve the accelerometer's parameters.
 
 use mimu::calibration::Calibration;
-use mimu::plan::design::model::{Model, Setting, Terms};
+use mimu::plan::design::model::{Model, Setting};
 use mimu::plan::design::next_pose::Had;
 use mimu::plan::design::reach::{Fixture, Rates, Reach};
 use mimu::prepared::Prepared;
@@ -49,7 +49,7 @@ pub fn of(prepared: &Prepared, calibration: Option<&Calibration>) -> Poses {
         .map(|force| force.normalize())
         .collect();
     let reach = Reach {
-        model: Model::accel(prepared.manifest.reference, &Terms::default()),
+        model: Model::accel(prepared.manifest.reference),
         fixture: Fixture::Hand,
         rates: Rates::Any,
     };

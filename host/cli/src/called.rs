@@ -48,11 +48,11 @@ pub fn import(arguments: Vec<OsString>) -> Result<ImportSummary, Refusal> {
     Ok(imported(parsed::<ImportArgs>("import", arguments)?)?.0)
 }
 
-/// Result of `mimu design` with these arguments, and the plan as TOML; a comparison has no plan.
+/// Result of `mimu design` with these arguments, and the plan as TOML.
 ///
 /// # Errors
 /// See [`Refusal`].
-pub fn design(arguments: Vec<OsString>) -> Result<(Designed, Option<String>), Refusal> {
+pub fn design(arguments: Vec<OsString>) -> Result<(Designed, String), Refusal> {
     Ok(parsed::<DesignArgs>("design", arguments)?.made()?)
 }
 

@@ -43,7 +43,7 @@ pub use allan::allan_text;
 pub use apply::apply_text;
 pub use certificate::certificate_page;
 pub use compare::compare_text;
-pub use design::{comparison_text, design_text, next_text};
+pub use design::{design_text, next_text};
 pub use device::{
     check_text, counters_text, download_text, info_text, kalman_text, record_text, self_test_text,
     stream_text, trim_text, upload_text,
@@ -57,7 +57,7 @@ pub use page::Made;
 pub(crate) use page::problems_text;
 pub(crate) use refusal::{print_refusal, refused};
 pub use sessions::sessions_text;
-pub use thermal::{thermal_comparison_text, thermal_page, thermal_text};
+pub use thermal::{thermal_page, thermal_text};
 pub use thermal_plan::thermal_plan_text;
 #[cfg(not(target_family = "wasm"))]
 pub(crate) use thermal_record::{thermal_progress, thermal_record_text};

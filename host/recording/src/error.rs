@@ -89,7 +89,6 @@ arguments! {
     Accept, "--accept", "Products that are accepted on the evidence of one recording.";
     Force, "--force", "Writing a calibration that is judged a misfit.";
     Base, "--base", "The calibration at one temperature that curves are added to.";
-    Estimator, "--estimator", "The estimator of curves over temperature.";
     Range, "--range", "Temperatures that a plan covers.";
     Curves, "--curves line", "Shape of curves over temperature.";
     SetPoints, "--points", "Set points of a soak.";

@@ -1,4 +1,4 @@
-//! What a curve over temperature is made of: a constant, a line, a cubic, or a smooth spline.
+//! What a curve over temperature is made of: a line, a cubic, or a smooth spline.
 
 use nalgebra::DMatrix;
 
@@ -13,8 +13,6 @@ const MOST_INTERVALS: usize = 20;
 /// Shape of a curve.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Shape {
-    /// One value for all temperatures.
-    Constant,
     /// A straight line.
     Line,
     /// One cubic for the whole range, niu (3).
@@ -55,7 +53,6 @@ impl Basis {
     /// Number of functions.
     pub fn functions(&self) -> usize {
         match self.shape {
-            Shape::Constant => 1,
             Shape::Line => 2,
             Shape::Cubic => 4,
             Shape::Spline => self.intervals + 3,
@@ -109,7 +106,6 @@ impl Basis {
     fn within(&self, temp_c: f64) -> (usize, [f64; 4]) {
         let x = self.unit(temp_c);
         match self.shape {
-            Shape::Constant => (0, [1.0, 0.0, 0.0, 0.0]),
             Shape::Line => (0, [1.0, x, 0.0, 0.0]),
             Shape::Cubic => (0, [1.0, x, x * x, x * x * x]),
             Shape::Spline => {
@@ -130,7 +126,6 @@ impl Basis {
         let x = self.unit(temp_c);
         let per_k = 2.0 / (self.high - self.low).max(1e-9);
         match self.shape {
-            Shape::Constant => (0, [0.0; 4]),
             Shape::Line => (0, [0.0, per_k, 0.0, 0.0]),
             Shape::Cubic => (0, [0.0, 1.0, 2.0 * x, 3.0 * x * x].map(|v| v * per_k)),
             Shape::Spline => {

@@ -3,7 +3,10 @@
 //! Readings that are not at rest, clipped or too short are left out of a fit. If they are many, the curves represent less than a person
 //! would think.
 
+use std::collections::BTreeSet;
+
 use mimu::quantity::Sensor;
+use mimu::signal::blocks::extent;
 use mimu_recording::Reference;
 use mimu_recording::error::{Argument, Error, Result};
 
@@ -21,37 +24,21 @@ const MOST: f64 = 0.9;
 
 /// The part of `sessions` that the curves of `sensor` use; `None` if they have no rows of it.
 pub fn of(sessions: &[Session], sensor: Sensor) -> Option<Used> {
-    let bin = |t: f64| (t / BIN_K).floor() as i64;
-    let (mut recorded, mut used) = (Vec::new(), Vec::new());
-    let (mut all, mut taken) = (0.0, 0.0);
-    let none = [f64::INFINITY, f64::NEG_INFINITY];
-    let (mut recorded_c, mut used_c) = (none, none);
-    let widen = |range: &mut [f64; 2], t: f64| *range = [range[0].min(t), range[1].max(t)];
+    let (mut used, mut taken, mut all) = (Vec::new(), 0.0, 0.0);
     for session in sessions {
         let rows = &session.rows[sensor];
-        let thermometer = &session.thermometer;
-        all += session.samples;
+        used.extend(rows.iter().map(|r| session.thermometer.at(r.middle_s).0));
         taken += rows.iter().map(|r| r.samples).sum::<f64>();
-        for row in rows {
-            let (t, _) = thermometer.at(row.middle_s);
-            used.push(bin(t));
-            widen(&mut used_c, t);
-        }
-        for second in 0..=thermometer.duration_s() as u64 {
-            let (t, _) = thermometer.at(thermometer.start_s() + second as f64);
-            recorded.push(bin(t));
-            widen(&mut recorded_c, t);
-        }
+        all += session.samples;
     }
-    for bins in [&mut recorded, &mut used] {
-        bins.sort_unstable();
-        bins.dedup();
-    }
+    let recorded = || sessions.iter().flat_map(|s| s.thermometer.values());
+    let bin = |t: &f64| (t / BIN_K).floor() as i64;
+    let bins = |all: BTreeSet<i64>| all.len() as f64;
     (!used.is_empty()).then(|| Used {
         samples: taken / all,
-        temperatures: used.len() as f64 / recorded.len() as f64,
-        used_c,
-        recorded_c,
+        temperatures: bins(used.iter().map(bin).collect()) / bins(recorded().map(bin).collect()),
+        used_c: extent(used.iter().copied()),
+        recorded_c: extent(recorded().copied()),
     })
 }
 

@@ -1,54 +1,27 @@
-//! `mimu thermal fit` from memory: curves by one of the estimators, judged.
+//! `mimu thermal fit` from memory: curves, judged.
 
 use mimu::calibration::{Calibration, CurvesOfUnit, TriadOfCurves, reference_node};
 use mimu::estimate::earth::RATE;
 use mimu::quantity::{PerSensor, Sensor};
 use mimu::signal::blocks::extent;
-use mimu_recording::error::{Argument, Error, Result};
+use mimu_recording::error::{Error, Result};
 use mimu_recording::{Reference, are_two_units};
 use serde::Serialize;
 
 use crate::basis::{CURVATURE_SPAN, Shape};
-use crate::classic::{self, Classic};
 use crate::coverage;
 use crate::extrapolation;
 use crate::joint::{Choice, Joint, estimate};
 use crate::judge::{self, Bin, DwellError, Hysteresis, Judging, rms};
 use crate::nodes;
-use crate::path::is_one_way;
-use crate::profile::Profile;
 use crate::reference_error::{self, CommonErrors};
 use crate::session::Session;
 use crate::thermometer::{Die, Start};
 use crate::warning::Warning;
 
-/// How the curves are estimated.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Estimator {
-    /// All curves and the lag together.
-    Joint,
-    /// The same with one cubic for each parameter.
-    Cubic,
-    /// One of the literature.
-    Classic(Classic),
-}
-
-impl Estimator {
-    /// As on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Joint => "joint",
-            Self::Cubic => "cubic",
-            Self::Classic(classic) => classic.name(),
-        }
-    }
-}
-
 /// Options of a fit.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Options {
-    /// Estimator.
-    pub estimator: Estimator,
     /// A lag that is known, s; none to estimate it.
     pub lag_s: Option<f64>,
     /// Temperatures that the curves must cover, °C.
@@ -100,7 +73,7 @@ pub struct Judged {
 /// Curves over temperature, judged.
 #[derive(Debug, Clone)]
 pub struct ThermalFit {
-    /// Curves, lag and noise. For an estimator of the literature the lag is zero.
+    /// Curves, lag and noise.
     pub joint: Joint,
     /// The recordings.
     pub sessions: Vec<Session>,
@@ -126,26 +99,15 @@ pub fn fit(sessions: Vec<Session>, verify: &[Session], options: Options) -> Resu
         .collect();
     check_verifying(&sessions, verify)?;
     coverage::check(&sessions, &mut warnings)?;
-    let has_intervals = !matches!(options.estimator, Estimator::Classic(_));
-    reference_error::check(&sessions, has_intervals)?;
-    let mut joint = match options.estimator {
-        Estimator::Joint => smooth(&sessions, options, &mut warnings)?,
-        Estimator::Cubic => {
-            let choice = Choice {
-                shape: Shape::Cubic,
-                lag_s: options.lag_s,
-            };
-            estimate(&sessions, choice)?
-        }
-        Estimator::Classic(classic) => of_literature(&sessions, classic)?,
-    };
+    reference_error::check(&sessions)?;
+    let mut joint = smooth(&sessions, options, &mut warnings)?;
     for (sensor, curves) in joint.curves.as_mut() {
         if let Some(curves) = curves {
             curves.count(CommonErrors::of(&sessions, sensor));
         }
     }
     warnings.extend(joint.warnings.iter().cloned());
-    if has_intervals && sessions.iter().all(|s| s.noise_at_rest == [None; 6]) {
+    if sessions.iter().all(|s| s.noise_at_rest == [None; 6]) {
         warnings.push(Warning::WithoutNoise);
     }
     check_range(&joint, options.range_c)?;
@@ -156,7 +118,7 @@ pub fn fit(sessions: Vec<Session>, verify: &[Session], options: Options) -> Resu
         floor > 0.0 && own > MISFIT * floor
     };
     let verdict = match joint.one_way {
-        _ if has_intervals && judged.present().any(|(_, j)| misfits(j)) => FitVerdict::Misfit,
+        _ if judged.present().any(|(_, j)| misfits(j)) => FitVerdict::Misfit,
         true => FitVerdict::OneWay,
         false => FitVerdict::Fitted,
     };
@@ -232,31 +194,6 @@ fn earth_in_intervals(sessions: &[Session], joint: &Joint) -> Option<Warning> {
     let matters = (0..3).any(|axis| sigma(axis) < RATE);
     let warned = matters && sessions.iter().any(unknown);
     warned.then_some(Warning::Recording(mimu::warning::Warning::NoLatitude))
-}
-
-fn of_literature(sessions: &[Session], classic: Classic) -> Result<Joint> {
-    let mut curves = PerSensor::default();
-    for sensor in Sensor::BOTH {
-        if sessions.iter().any(|s| s.reference == Reference::Gravity) {
-            let problem = format!("the estimator {} needs known inputs", classic.name());
-            let remedy = "use the joint estimator, or record with a table";
-            let error = Error::new(&sessions[0].place, problem, remedy);
-            return Err(error.about(Argument::Estimator));
-        }
-        curves[sensor] = classic::estimate(sessions, sensor, classic)?;
-    }
-    let settled = |s: &Session| s.thermometer.die(0.0, Start::Settled);
-    let dies: Vec<Die> = sessions.iter().map(settled).collect();
-    Ok(Joint {
-        curves,
-        profiles: PerSensor::both(Profile::fixed(0.0, 0.0)),
-        one_way: is_one_way(sessions, &dies),
-        apart: None,
-        contradicted: PerSensor::default(),
-        noise: PerSensor::default(),
-        starts: vec![Start::Settled; sessions.len()],
-        warnings: Vec::new(),
-    })
 }
 
 fn check_verifying(sessions: &[Session], verify: &[Session]) -> Result<()> {
@@ -389,7 +326,7 @@ impl ThermalFit {
             let [own, floor] = rms(&judged.errors);
             Some(TriadOfCurves {
                 triad: curves.triad(temp_c)?,
-                estimator: self.options.estimator.name(),
+                estimator: "joint",
                 rms: own,
                 held_out_rms: judged.held_out.as_ref().map(|h| rms(h)[0]),
                 noise_floor: floor,

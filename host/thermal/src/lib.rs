@@ -16,10 +16,8 @@
 //! | [`base`], [`biases`] | curves of the biases, added to a calibration at one temperature, and alone |
 //! | [`path`] | whether a recording returns to earlier temperatures |
 //! | [`judge`] | errors of dwells, by temperature, separately for heating and cooling |
-//! | [`classic`], [`points`] | estimators of the literature, for comparison |
-//! | [`mod@fit`], [`extrapolation`] | curves by one of the estimators, judged; whether there is curvature at all |
+//! | [`mod@fit`], [`extrapolation`] | curves, judged; whether there is curvature at all |
 //! | [`judgement`] | the judgement of such a fit |
-//! | [`mod@compare`] | two calibrations, curve by curve |
 //! | [`plan`] | procedures in chamber and table, and how well the curves are known afterwards |
 //! | [`result`] | the result, as written to JSON |
 //! | [`warning`] | warnings for people |
@@ -28,8 +26,6 @@ pub mod base;
 pub mod basis;
 pub mod bias_jumps;
 pub mod biases;
-pub mod classic;
-pub mod compare;
 pub mod coverage;
 pub mod curves;
 mod earth;
@@ -44,7 +40,6 @@ pub mod nodes;
 pub mod noise;
 pub mod path;
 pub mod plan;
-pub mod points;
 pub mod profile;
 mod reference_error;
 pub mod regression;

@@ -55,11 +55,11 @@ fn stated(sessions: &[Session]) -> Option<(&Session, &ReferenceError)> {
     each.next()
 }
 
-/// Refuses statements that the curves cannot count, instead of making intervals that lack them. `has_intervals`: whether the estimator gives any.
+/// Refuses statements that the curves cannot count, instead of making intervals that lack them.
 ///
 /// # Errors
-/// Sessions that state different errors, errors that depend on the pose, an estimator without intervals, recordings at rest.
-pub(crate) fn check(sessions: &[Session], has_intervals: bool) -> Result<()> {
+/// Sessions that state different errors, errors that depend on the pose, recordings at rest.
+pub(crate) fn check(sessions: &[Session]) -> Result<()> {
     let Some((first, error)) = stated(sessions) else {
         return Ok(());
     };
@@ -78,8 +78,8 @@ pub(crate) fn check(sessions: &[Session], has_intervals: bool) -> Result<()> {
         let remedy = "state the same in all recordings: they are common to all temperatures";
         return refuse(&first.place, problem, remedy);
     }
-    if first.reference != Reference::Table || !has_intervals {
-        let problem = "curves count them only for known inputs (reference = \"table\") and the estimators joint and cubic";
+    if first.reference != Reference::Table {
+        let problem = "curves count them only for known inputs (reference = \"table\")";
         let remedy = "leave them out, and know that no interval includes them";
         return refuse(&first.place, problem.into(), remedy);
     }

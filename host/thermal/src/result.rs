@@ -29,8 +29,6 @@ pub struct ThermalResult {
     pub device: String,
     /// Samples files, with their SHA-256.
     pub recordings: Vec<RecordingResult>,
-    /// How it was estimated.
-    pub estimator: &'static str,
     /// Whether it distinguishes lag and slope, and describes the readings.
     pub verdict: FitVerdict,
     /// The judgement.
@@ -124,7 +122,6 @@ impl ThermalResult {
             tool: concat!("mimu ", env!("CARGO_PKG_VERSION")),
             device: fit.sessions[0].device.clone(),
             recordings: recordings(fit),
-            estimator: fit.options.estimator.name(),
             verdict: fit.verdict,
             judgement: fit.judgement(),
             range_c: range(&fit.joint),
@@ -200,10 +197,7 @@ fn lag(fit: &ThermalFit, sensor: Sensor) -> Result<Lag, String> {
         upper,
     } = found;
     if profile.is_given() {
-        return Err(match fit.options.lag_s {
-            Some(given) => format!("it was given as {given} s"),
-            None => "this estimator has none".into(),
-        });
+        return Err(format!("it was given as {value} s"));
     }
     if fit.joint.one_way {
         return Err(

@@ -1,6 +1,7 @@
 //! Recordings that no curves can be estimated from: what is wrong with them, and what to do.
 
 use mimu::quantity::{duration, significant};
+use mimu::signal::blocks::extent;
 use mimu_recording::are_two_units;
 use mimu_recording::error::{Argument, Error, Result};
 
@@ -68,37 +69,22 @@ pub struct Spans {
     stretches: Vec<[f64; 2]>,
 }
 
-const NOWHERE: [f64; 2] = [f64::INFINITY, f64::NEG_INFINITY];
-
-fn widen(range: &mut [f64; 2], t: f64) {
-    *range = [range[0].min(t), range[1].max(t)];
-}
-
 impl Spans {
     /// From the rows of `sessions`.
     pub fn of(sessions: &[Session]) -> Self {
-        let mut stretches: Vec<[f64; 2]> = sessions
-            .iter()
-            .map(|session| {
-                let mut range = NOWHERE;
-                for row in session.rows.iter().flat_map(|(_, rows)| rows) {
-                    widen(&mut range, session.thermometer.at(row.middle_s).0);
-                }
-                range
-            })
-            .filter(|range| range[0] <= range[1])
-            .collect();
+        let of = |session: &Session| {
+            let rows = session.rows.iter().flat_map(|(_, rows)| rows);
+            extent(rows.map(|row| session.thermometer.at(row.middle_s).0))
+        };
+        let all = sessions.iter().map(of);
+        let mut stretches: Vec<[f64; 2]> = all.filter(|[low, high]| low <= high).collect();
         stretches.sort_by(|a, b| a[0].total_cmp(&b[0]));
         Self { stretches }
     }
 
     /// Lowest and highest temperature of all, °C.
     pub fn range(&self) -> [f64; 2] {
-        let mut range = NOWHERE;
-        for t in self.stretches.iter().flatten() {
-            widen(&mut range, *t);
-        }
-        range
+        extent(self.stretches.iter().flatten().copied())
     }
 
     /// The widest of a session, °C.
@@ -135,15 +121,7 @@ impl Spans {
             true => format!("{} K ({low:.1} to {high:.1} °C)", significant(high - low)),
             false => "nothing".to_string(),
         };
-        let mut column = NOWHERE;
-        for thermometer in sessions.iter().map(|s| &s.thermometer) {
-            for second in 0..=thermometer.duration_s() as u64 {
-                widen(
-                    &mut column,
-                    thermometer.at(thermometer.start_s() + second as f64).0,
-                );
-            }
-        }
+        let column = extent(sessions.iter().flat_map(|s| s.thermometer.range()));
         let (used, widest) = (self.range(), self.widest());
         let shows = |[low, high]: [f64; 2]| high - low >= SLOPE_SPAN;
         let needs = format!("a slope needs {SLOPE_SPAN} K, curvature 20 K");

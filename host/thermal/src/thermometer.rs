@@ -156,6 +156,11 @@ impl Thermometer {
         extent(self.temp_c.iter().copied())
     }
 
+    /// Smoothed temperatures, one a second, °C.
+    pub fn values(&self) -> &[f64] {
+        &self.temp_c
+    }
+
     /// Beginning of the record, s.
     pub fn start_s(&self) -> f64 {
         self.start_s

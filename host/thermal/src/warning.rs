@@ -40,8 +40,6 @@ pub enum Warning {
     CurvatureRefused { times: f64 },
     /// The noise of the unit at rest is not known.
     WithoutNoise,
-    /// Names of the units of two calibrations that are compared.
-    TwoUnits { one: String, other: String },
 }
 
 impl fmt::Display for Warning {
@@ -115,7 +113,6 @@ impl fmt::Display for Warning {
             Self::WithoutNoise => f.write_str(
                 "intervals of the biases include only the wander that the recordings show. A noise file shows slower wander: run `mimu allan` on the unit at rest for hours",
             ),
-            Self::TwoUnits { one: a, other: b } => write!(f, "they belong to two units, {a:?} and {b:?}"),
         }
     }
 }

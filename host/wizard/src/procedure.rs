@@ -1,6 +1,6 @@
 //! Settings of a session, and its dwells: the first ones, the next one by the information that it adds, and those for the verification.
 
-use mimu::plan::design::model::{Model, Setting, Terms};
+use mimu::plan::design::model::{Model, Setting};
 use mimu::plan::design::next_pose::Had;
 use mimu::plan::design::reach::{Fixture as Reached, Rates, Reach};
 use mimu::plan::design::tour::randomised;
@@ -303,14 +303,13 @@ pub fn next_step(config: &SessionConfig, done: &[Step], missed: Missed) -> Step 
         }
     };
     let reference = config.fixture.reference();
-    let terms = Terms::default();
     let mut models = Vec::new();
     if missed[1] || missed == [false; 2] {
-        models.push((true, Model::accel(reference, &terms)));
+        models.push((true, Model::accel(reference)));
     }
     if missed[0] && reference == Reference::Table {
         let span = Vector3::repeat(config.largest_rate_dps.to_radians());
-        models.push((false, Model::gyro(&terms, span)));
+        models.push((false, Model::gyro(span)));
     }
     let reaches = models.into_iter().map(|(of_accel, model)| {
         let reach = Reach {

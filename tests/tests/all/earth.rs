@@ -52,12 +52,10 @@ fn a_good_mems_gyro_on_a_table_is_not_off_by_the_rate_of_the_earth() {
 
 #[test]
 fn the_scheme_of_niu_gives_biases_over_temperature_without_the_rate_of_the_earth() {
-    for experiment in [Experiment::Ramp, Experiment::RampNiu] {
-        let (each, errors) = runs(experiment, true, 2);
-        let rms = errors.iter().map(|e| e[0] * e[0]).sum::<f64>() / errors.len() as f64;
-        assert_covered(&errors);
-        // The noise of the scheme leaves 0.6 (joint) and 1.3 deg/h; the Earth turns at 15.
-        assert!(rms.sqrt() < 2.0 * DEG_PER_H, "{experiment:?}: {errors:?}");
-        assert!(each.iter().all(|e| e.verdict != "misfit"), "{each:?}");
-    }
+    let (each, errors) = runs(Experiment::Ramp, true, 2);
+    let rms = errors.iter().map(|e| e[0] * e[0]).sum::<f64>() / errors.len() as f64;
+    assert_covered(&errors);
+    // The noise of the scheme leaves 0.6 deg/h; the Earth turns at 15.
+    assert!(rms.sqrt() < 2.0 * DEG_PER_H, "{errors:?}");
+    assert!(each.iter().all(|e| e.verdict != "misfit"), "{each:?}");
 }

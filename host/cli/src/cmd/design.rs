@@ -9,12 +9,10 @@ use std::path::{Path, PathBuf};
 use clap::{ArgGroup, Args, ValueEnum};
 use mimu::plan::design::Problem;
 use mimu::plan::design::budget::Session;
-use mimu::plan::design::model::{Model, Setting, Terms};
 use mimu::plan::design::reach::{Fixture, RateList, Rates};
-use mimu::plan::design::schemes::Scheme;
-use mimu::plan::design::tour::{Motion, Order, randomised};
+use mimu::plan::design::tour::{Motion, randomised};
 use mimu::quantity::Sensor;
-use mimu::result::design::{Comparison, Conditions, Design};
+use mimu::result::design::{Conditions, Design};
 use mimu::result::next_experiment::NextExperiment;
 use mimu_recording::Reference;
 use mimu_recording::error::{Error, Result};
@@ -28,8 +26,8 @@ use crate::report;
 use noise::NoiseArg;
 
 #[derive(Args)]
-#[command(group(ArgGroup::new("design").args(["n", "budget", "scheme", "compare", "effects"])))]
-#[command(group(ArgGroup::new("goal").required(true).multiple(true).args(["n", "budget", "scheme", "compare", "effects", "prior"])))]
+#[command(group(ArgGroup::new("design").args(["n", "budget", "effects"])))]
+#[command(group(ArgGroup::new("goal").required(true).multiple(true).args(["n", "budget", "effects", "prior"])))]
 pub struct DesignArgs {
     /// Sensor to calibrate
     #[arg(long, value_enum, default_value = "accel")]
@@ -37,24 +35,15 @@ pub struct DesignArgs {
     /// What is known of the input: table (all of it) or gravity (its magnitude at rest) [default: table, or gravity with --table hand or --prior]
     #[arg(long)]
     reference: Option<Reference>,
-    /// Terms to be determined: affine, and any of quadratic, cubic, cross, g-sensitivity
-    #[arg(long, value_name = "LIST", default_value = "affine")]
-    model: Terms,
     /// Find the best design of N dwells
     #[arg(short, value_name = "N", value_parser = dwells, allow_negative_numbers = true)]
     n: Option<u16>,
     /// Find the best number and length of dwells within this time in minutes, moves included
     #[arg(long, value_name = "MINUTES", value_parser = |t: &str| number(t, 0.1, 2880.0))]
     budget: Option<f64>,
-    /// Judge a published scheme
-    #[arg(long, value_enum, value_name = "NAME")]
-    scheme: Option<SchemeArg>,
-    /// Compare all published schemes with the best designs of as many dwells
-    #[arg(long)]
-    compare: bool,
     /// Find the smallest experiment that shows these effects (see `mimu diagnose`)
     #[arg(long, value_name = "ID[,ID..]", value_delimiter = ',',
-          conflicts_with_all = ["model", "sigma", "instability", "walk", "order"])]
+          conflicts_with_all = ["sigma", "instability", "walk"])]
     effects: Option<Vec<String>>,
     /// With --effects: a recording of the unit, for its noise, sensors, rates and fixture
     #[arg(long, value_name = "REC", requires = "effects")]
@@ -64,7 +53,7 @@ pub struct DesignArgs {
     chamber: Option<[f64; 3]>,
     /// Population of the unit's kind (`mimu fleet --prior`): the plan counts what it says, and is for poses by hand
     ///
-    /// Without -n, --budget or --scheme, the plan has the fewest dwells that meet the targets. Fit its recording with `mimu fit --prior` and the same
+    /// Without -n or --budget, the plan has the fewest dwells that meet the targets. Fit its recording with `mimu fit --prior` and the same
     /// file.
     #[arg(long, value_name = "FILE")]
     prior: Option<PathBuf>,
@@ -76,7 +65,7 @@ pub struct DesignArgs {
     aim: f64,
     /// With --prior: target for the half-width of a 95 % interval: accel-bias=1 (mg), accel-scale=1000 (ppm), accel-angle=1000 (µrad), which are the
     /// defaults and those of the wizard; may be repeated
-    #[arg(long = "target", value_name = "NAME=VALUE", requires = "prior", conflicts_with_all = ["n", "budget", "scheme"])]
+    #[arg(long = "target", value_name = "NAME=VALUE", requires = "prior", conflicts_with_all = ["n", "budget"])]
     targets: Vec<String>,
     /// What holds the unit [default: three-axis, or hand with --reference gravity or --prior]
     #[arg(long, value_enum)]
@@ -87,15 +76,8 @@ pub struct DesignArgs {
     #[arg(long, value_name = "S", conflicts_with = "budget",
           value_parser = |t: &str| number(t, 0.1, 86400.0))]
     dwell: Option<f64>,
-    /// Order of the dwells [default: randomised; published schemes as published]
-    ///
-    /// Biases wander, and neighbouring dwells share most of it. If their inputs are similar, the shared part enters the parameters. With 22
-    /// dwells and a random walk of the bias, the true variance of scale factors and misalignments is 9 times what the fit claims in the
-    /// shortest order, and equals it in a randomised one. The additional time is printed.
-    #[arg(long, value_enum)]
-    order: Option<OrderArg>,
     /// Rates of the table for a gyro, deg/s: `10,100,300`, or `..300` for any up to 300 [default: ..300]
-    #[arg(long, value_name = "LIST", conflicts_with_all = ["scheme", "compare"])]
+    #[arg(long, value_name = "LIST")]
     rates: Option<RateList>,
     /// Rate of moves between attitudes, deg/s [default: 10 on a table, 45 by hand]
     #[arg(long, value_name = "DPS", value_parser = |t: &str| number(t, 0.01, 10000.0))]
@@ -120,7 +102,7 @@ pub struct DesignArgs {
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Plan to write, for a table or a person
-    #[arg(short, value_name = "FILE", conflicts_with = "compare")]
+    #[arg(short, value_name = "FILE")]
     output: Option<PathBuf>,
     #[command(flatten)]
     verbose: VerboseArgs,
@@ -138,31 +120,6 @@ enum TableArg {
     Faces,
     /// Every attitude, by hand
     Hand,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum OrderArg {
-    /// Shortest moves found
-    Shortest,
-    /// Randomised from the seed
-    #[value(alias = "lot")]
-    Randomised,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum SchemeArg {
-    /// Each axis up and down
-    SixFace,
-    /// Nine positions (fang, Table 2)
-    FangNine,
-    /// 33 accelerometer positions (xu, appendix)
-    #[value(name = "xu-33")]
-    Xu33,
-    /// Rates about each axis in both directions (xu, 2.2.1)
-    XuRates,
-    /// Eight dwells on a two-axis table (niu, 3.2)
-    #[value(name = "niu-8")]
-    Niu8,
 }
 
 fn dwells(text: &str) -> std::result::Result<u16, String> {
@@ -214,22 +171,22 @@ impl DesignArgs {
         }
     }
 
-    /// Requested order of a design; `None`: the default, which for a published scheme is the published order.
-    fn order(&self) -> Option<Order> {
-        self.order.map(|order| match order {
-            OrderArg::Shortest => Order::Shortest,
-            OrderArg::Randomised => Order::Randomised,
-        })
-    }
-
-    /// The problem; `span` are the full rates of a gyro.
-    fn problem(&self, span: Vector3<f64>, rates: Rates) -> Result<Problem> {
+    /// The problem with the requested rates of the table.
+    fn problem(&self) -> Result<Problem> {
         match (self.sensor(), self.reference()) {
-            (Sensor::Accel, reference) => {
-                Problem::accel(Model::accel(reference, &self.model), self.fixture())
-            }
+            (Sensor::Accel, _) if self.rates.is_some() => Err(Error::new(
+                "--rates",
+                "dwells of an accelerometer are at rest",
+                "leave it out, or use --sensor gyro",
+            )),
+            (Sensor::Accel, reference) => Problem::accel(reference, self.fixture()),
             (Sensor::Gyro, Reference::Table) => {
-                Problem::gyro(Model::gyro(&self.model, span), self.fixture(), rates)
+                let (dps, rates) = match &self.rates {
+                    Some(list) => (list.largest_dps, list.rates.clone()),
+                    None => (RATE_DPS, Rates::Any),
+                };
+                let span = Vector3::repeat(dps.to_radians());
+                Problem::gyro(span, self.fixture(), rates)
             }
             (Sensor::Gyro, Reference::TurntableRate) => Err(Error::new(
                 "gyro, --reference turntable-rate",
@@ -244,82 +201,26 @@ impl DesignArgs {
         }
     }
 
-    /// The problem with the requested rates of the table.
-    fn own_problem(&self) -> Result<Problem> {
-        match (&self.rates, self.sensor()) {
-            (Some(_), Sensor::Accel) => Err(Error::new(
-                "--rates",
-                "dwells of an accelerometer are at rest",
-                "leave it out, or use --sensor gyro",
-            )),
-            (Some(list), Sensor::Gyro) => {
-                let span = Vector3::repeat(list.largest_dps.to_radians());
-                self.problem(span, list.rates.clone())
-            }
-            (None, _) => self.problem(Vector3::repeat(RATE_DPS.to_radians()), Rates::Any),
-        }
-    }
-
-    /// Reports a design of one pass over `settings`, in the requested order; by default in the given order.
-    fn report(
-        &self,
-        problem: &Problem,
-        title: String,
-        settings: &[Setting],
-        order: Option<Order>,
-    ) -> Result<Design> {
+    /// The best design found of `n` dwells, in a randomised order.
+    fn best(&self, problem: &Problem, n: usize, title: String) -> Result<Design> {
+        let settings = problem.best(n, self.seed)?;
         let (noise, dwell_s, sigma) = self.dwell()?;
-        let motion = self.motion();
-        let shortest = motion.shortest(settings);
-        let shortest_moves_s = motion.moves_s(&shortest).min(motion.moves_s(settings));
-        let settings = match order {
-            None => settings.to_vec(),
-            Some(Order::Shortest) => shortest,
-            Some(Order::Randomised) => randomised(settings, self.seed),
-        };
         let conditions = Conditions {
             title,
             dwell_s,
             noise: self.sigma.is_none().then_some(noise),
             assumed_noise: self.assumed_noise(),
-            motion,
-            order,
-            shortest_moves_s,
+            motion: self.motion(),
         };
-        let judgement = problem.judge(&settings, sigma);
+        let judgement = problem.judge(&randomised(&settings, self.seed), sigma);
         Ok(Design::new(problem, judgement, conditions))
     }
 
-    fn best(&self, problem: &Problem, n: usize, title: String) -> Result<Design> {
-        let settings = problem.best(n, self.seed)?;
-        let order = self.order().unwrap_or(Order::Randomised);
-        self.report(problem, title, &settings, Some(order))
-    }
-
-    fn scheme(&self, problem: &Problem, scheme: Scheme) -> Result<Design> {
-        let settings = scheme.settings(self.sensor())?;
-        let Some((settings, turned_over)) = self.fixture().holding(&settings) else {
-            return Err(Error::new(
-                format!("--scheme {}", scheme.name()),
-                format!(
-                    "--table {} cannot reach all of its poses",
-                    self.fixture().name()
-                ),
-                "use --table three-axis",
-            ));
-        };
-        let title = format!("scheme {}", scheme.name());
-        let design = self.report(problem, title, &settings, self.order())?;
-        Ok(design.of_scheme(problem, scheme, turned_over))
-    }
-
     fn within(&self, problem: &Problem, minutes: f64) -> Result<Design> {
-        let order = self.order().unwrap_or(Order::Randomised);
         let session = Session {
             time_s: 60.0 * minutes,
             noise: self.noise()?,
             motion: self.motion(),
-            order,
         };
         let budget = session.spend(problem, self.seed)?;
         let best = &budget.best;
@@ -329,8 +230,6 @@ impl DesignArgs {
             noise: Some(session.noise),
             assumed_noise: self.assumed_noise(),
             motion: session.motion,
-            order: Some(order),
-            shortest_moves_s: best.shortest_moves_s,
         };
         let judgement = problem.judge(&best.settings, best.sigma);
         let design = Design::new(problem, judgement, conditions);
@@ -339,59 +238,17 @@ impl DesignArgs {
 
     /// The requested single design.
     fn designed(&self) -> Result<Design> {
-        match (self.scheme, self.budget, self.n) {
-            (Some(scheme), ..) => {
-                let scheme = match scheme {
-                    SchemeArg::SixFace => Scheme::SixFace,
-                    SchemeArg::FangNine => Scheme::FangNine,
-                    SchemeArg::Xu33 => Scheme::Xu33,
-                    SchemeArg::XuRates => Scheme::XuRates,
-                    SchemeArg::Niu8 => Scheme::Niu8,
-                };
-                let problem = self.problem(scheme.rate_span(), Rates::Any)?;
-                let problem = self.beside_prior(problem)?;
-                let design = self.scheme(&problem, scheme)?;
-                Ok(design.beside_population(&problem, self.seed, None))
-            }
-            (_, Some(minutes), _) => {
-                let problem = self.beside_prior(self.own_problem()?)?;
-                let design = self.within(&problem, minutes)?;
-                Ok(design.beside_population(&problem, self.seed, None))
-            }
-            (_, _, Some(n)) => {
+        let problem = self.beside_prior(self.problem()?)?;
+        let design = match (self.budget, self.n) {
+            (Some(minutes), _) => self.within(&problem, minutes)?,
+            (_, Some(n)) => {
                 let n = usize::from(n);
                 let title = format!("best of {n} dwells found (seed {})", self.seed);
-                let problem = self.beside_prior(self.own_problem()?)?;
-                let design = self.best(&problem, n, title)?;
-                Ok(design.beside_population(&problem, self.seed, None))
+                self.best(&problem, n, title)?
             }
-            (_, _, None) => self.fewest(&self.beside_prior(self.own_problem()?)?),
-        }
-    }
-
-    /// Every scheme for the sensor, each followed by the best design of as many dwells; and the schemes that exceed the table's reach.
-    fn compare(&self) -> Result<Comparison> {
-        let (mut reports, mut out_of_reach) = (Vec::new(), Vec::new());
-        let mut done: Vec<(usize, Vector3<f64>)> = Vec::new();
-        for scheme in Scheme::ALL {
-            let Ok(settings) = scheme.settings(self.sensor()) else {
-                continue;
-            };
-            let (n, span) = (settings.len(), scheme.rate_span());
-            let problem = self.problem(span, Rates::Any)?;
-            if self.fixture().holding(&settings).is_none() {
-                out_of_reach.push(scheme);
-                continue;
-            }
-            reports.push(self.scheme(&problem, scheme)?);
-            let enough =
-                problem.optimum.parameters <= n * problem.reach.model.distinct_regressions();
-            if enough && !done.contains(&(n, span)) {
-                done.push((n, span));
-                reports.push(self.best(&problem, n, format!("best of {n}"))?);
-            }
-        }
-        Ok(Comparison::new(reports, &out_of_reach))
+            (None, None) => return self.fewest(&problem),
+        };
+        Ok(design.beside_population(&problem, self.seed, None))
     }
 }
 
@@ -402,12 +259,10 @@ const RATE_DPS: f64 = 300.0;
 #[derive(Debug, Serialize)]
 #[serde(untagged)]
 pub enum Designed {
-    /// One design (`-n`, `--budget`, `--scheme`).
+    /// One design (`-n`, `--budget`).
     Design(Box<Design>),
     /// The smallest experiment that shows effects (`--effects`).
     NextExperiment(Box<NextExperiment>),
-    /// All published schemes (`--compare`).
-    Comparison(Comparison),
 }
 
 impl Designed {
@@ -416,25 +271,21 @@ impl Designed {
         match self {
             Self::Design(design) => report::design_text(design, verbose),
             Self::NextExperiment(next) => report::next_text(next),
-            Self::Comparison(comparison) => report::comparison_text(comparison),
         }
     }
 }
 
 impl DesignArgs {
     /// The requested result, and its plan as TOML.
-    pub(crate) fn made(&self) -> Result<(Designed, Option<String>)> {
+    pub(crate) fn made(&self) -> Result<(Designed, String)> {
         self.refuse_beside_prior()?;
         if let Some(ids) = &self.effects {
             let (next, plan) = effects::smallest_experiment(self, ids)?;
-            return Ok((Designed::NextExperiment(Box::new(next)), Some(plan)));
-        }
-        if self.compare {
-            return Ok((Designed::Comparison(self.compare()?), None));
+            return Ok((Designed::NextExperiment(Box::new(next)), plan));
         }
         let design = self.designed()?;
         let plan = design.plan(self.motion().slew);
-        Ok((Designed::Design(Box::new(design)), Some(plan)))
+        Ok((Designed::Design(Box::new(design)), plan))
     }
 }
 
@@ -453,7 +304,7 @@ pub fn run(args: &DesignArgs) -> Result<()> {
     let (made, plan) = args.made()?;
     let mut text = made.text(args.verbose.verbose);
     let mut staged = None;
-    if let (Some(path), Some(plan)) = (&args.output, plan) {
+    if let Some(path) = &args.output {
         staged = Some(stage(path, plan)?);
         text.push_str(&format!("\nplan: {}\n", path.display()));
     }

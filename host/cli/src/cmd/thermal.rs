@@ -6,15 +6,13 @@ mod record;
 
 use std::path::PathBuf;
 
-use clap::{Args, Subcommand, ValueEnum};
+use clap::{Args, Subcommand};
 use mimu::calibration::Calibration;
 use mimu::signal::stillness::{DwellSearch, Steps};
 use mimu_recording::error::Result;
 use mimu_recording::result_file::stage;
 use mimu_thermal::base;
-use mimu_thermal::classic::Classic;
-use mimu_thermal::compare::compare;
-use mimu_thermal::fit::{Estimator, Options, fit};
+use mimu_thermal::fit::{Options, fit};
 use mimu_thermal::result::ThermalResult;
 use mimu_thermal::session::Session;
 
@@ -22,7 +20,7 @@ use crate::arguments::{
     JsonArgs, NoiseArgs, StillArgs, StrictArgs, VerboseArgs, WritingArgs, with_noise,
 };
 use crate::hint::OF_A_LOG;
-use crate::output::{check_outputs, now, print};
+use crate::output::{now, print};
 use crate::reading::{LogArgs, read};
 use crate::report::{self, Made, thermal_plot};
 use crate::status::Status;
@@ -37,8 +35,6 @@ pub(crate) struct ThermalArgs {
 enum ThermalCommand {
     /// Estimate all parameters over temperature, and the lag of the dies behind the thermometer
     Fit(Box<FitArgs>),
-    /// Compare two calibrations over temperature, curve by curve
-    Compare(CompareArgs),
     /// Plan a procedure; prints its duration and the expected uncertainty of the curves
     Plan(plan::PlanArgs),
     #[cfg(not(target_family = "wasm"))]
@@ -55,9 +51,6 @@ pub struct FitArgs {
     /// Recording for judging only: a sweep at another rate, or a soak
     #[arg(long, value_name = "REC")]
     verify: Vec<PathBuf>,
-    /// Estimator; all but the first are for comparison
-    #[arg(long, value_enum, default_value = "joint")]
-    estimator: EstimatorArg,
     /// Lag of the dies if it is known; 0: no lag
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = lag)]
     lag: Option<f64>,
@@ -106,56 +99,11 @@ impl FitArgs {
         search
     }
 
-    /// How the curves are estimated.
+    /// What is known, and has to be covered.
     pub fn options(&self) -> Options {
         Options {
-            estimator: self.estimator.estimator(),
             lag_s: self.lag,
             range_c: self.range,
-        }
-    }
-}
-
-#[derive(Args)]
-struct CompareArgs {
-    /// Calibration file
-    first: PathBuf,
-    /// The second calibration file; differences are second minus first
-    second: PathBuf,
-    #[command(flatten)]
-    verbose: VerboseArgs,
-    #[command(flatten)]
-    json: JsonArgs,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum EstimatorArg {
-    /// Smooth curves of all parameters, the lag and the noise, estimated together
-    Joint,
-    /// The same with one cubic for each parameter
-    Cubic,
-    /// An affine fit in each bin of 10 K, without a lag
-    Nodes,
-    /// Ramp of niu: a fit of each cycle of the scheme, and cubics through these
-    RampNiu,
-    /// Soak: a fit of all 24 parameters at each plateau
-    Soak,
-    /// Soak by fang (33), (34) as printed: one scalar a pose
-    SoakFang,
-    /// Soak by fang (31), (32): scale factors and biases at each plateau, misalignments of the plateau nearest 25 °C
-    SoakConstantM,
-}
-
-impl EstimatorArg {
-    fn estimator(self) -> Estimator {
-        match self {
-            Self::Joint => Estimator::Joint,
-            Self::Cubic => Estimator::Cubic,
-            Self::Nodes => Estimator::Classic(Classic::Nodes),
-            Self::RampNiu => Estimator::Classic(Classic::RampNiu),
-            Self::Soak => Estimator::Classic(Classic::Soak),
-            Self::SoakFang => Estimator::Classic(Classic::SoakAsPrinted),
-            Self::SoakConstantM => Estimator::Classic(Classic::SoakConstantM),
         }
     }
 }
@@ -188,7 +136,6 @@ pub(crate) fn run(args: &ThermalArgs, command_line: &str) -> Result<Status> {
     let done = |()| Status::Done;
     match &args.command {
         ThermalCommand::Fit(args) => run_fit(args, command_line),
-        ThermalCommand::Compare(args) => run_compare(args).map(done),
         ThermalCommand::Plan(args) => plan::run(args).map(done),
         #[cfg(not(target_family = "wasm"))]
         ThermalCommand::Record(args) => record::run(args).map(done),
@@ -252,17 +199,4 @@ fn run_fit(args: &FitArgs, command_line: &str) -> Result<Status> {
         Some(error) => Err(error),
         None => Ok(args.strict.status(&result.judgement)),
     }
-}
-
-fn run_compare(args: &CompareArgs) -> Result<()> {
-    let inputs = [args.first.as_path(), args.second.as_path()];
-    check_outputs(&[args.json.file()], &inputs)?;
-    let [first, second] = [&args.first, &args.second].map(|path| Calibration::read(path));
-    let result = compare(&first?, &second?)?;
-    print(
-        &args.json,
-        &report::thermal_comparison_text(&result, args.verbose.verbose),
-        &result,
-        None,
-    )
 }

@@ -1,4 +1,4 @@
-//! A design, designs side by side, and the next experiment.
+//! A design, and the next experiment.
 
 mod prior;
 
@@ -7,7 +7,7 @@ use mimu::plan::design::judgement::WEAK;
 use mimu::plan::round;
 use mimu::quantity::{Figure, minutes, plural, significant};
 use mimu::readable;
-use mimu::result::design::{Comparison, Design, Noticed, Spent, Way};
+use mimu::result::design::{Design, Spent, Way};
 use mimu::result::next_experiment::NextExperiment;
 use mimu_equipment::step::words;
 
@@ -51,15 +51,13 @@ fn properties(report: &Design, level: Level) -> Markup {
             dt { "without the prior" } dd { (prior::without(prior)) }
         } @else if all {
             dt { "D-efficiency" } dd { (format!("{:.4}, of the continuous optimum over the reach", report.d_efficiency)) }
-            dt { "det(F'F/n)" } dd {
-                (significant(report.determinant)) ", optimum " (significant(report.optimum.determinant)) @if report.regressions > 1 { ": product over the three sensors" }
-            }
+            dt { "det(F'F/n)" } dd { (significant(report.determinant)) }
         }
         @if all { dt { "condition" } dd { @if report.condition.is_finite() { (significant(report.condition)) } @else { "singular" } } }
         dt { "time" } dd {
             (minutes(report.time_s)) ": " (plural(report.positions.len() as u64, "dwell")) " of " (significant(report.dwell_s)) " s" @if all { ", moves " (minutes(report.moves_s)) }
         }
-        @if all { dt { "order" } dd { (order(report)) } }
+        @if all { dt { "order" } dd { (report.order) } }
         dt { "sigma of a dwell mean" } dd { @match report.assumed_noise {
             Some(part) if !all => { (readable::parameter(report.dwell_sigma.unit).write(report.dwell_sigma.value)) ", if the noise is that of " (part) ": --noise takes yours" }
             _ => (sigma(report)),
@@ -69,20 +67,6 @@ fn properties(report: &Design, level: Level) -> Markup {
             None => { (plural(report.dof.lack_of_fit as u64, "dwell")) " beyond the parameters, which alone reveal a wrong model" @if all { ", and " (report.dof.repetition) " from repetitions" } }
             Some(_) => { (report.dof.lack_of_fit) " values beyond the parameters, which reveal a unit of another kind" }
         } }
-        @if all {
-            @for notice in &report.notices { (noticed(notice)) }
-            @if let Some(filters) = &report.filters {
-                @let shares = filters.each_ref().map(|f| format!("{:.4}", f.d_efficiency)).join(", ");
-                dt { "as published" } dd {
-                    "the filters for x, y and z use four of the nine positions each, fang (26)-(28): their D-efficiency is " (shares)
-                    ", their sigmas are " (significant(filters[0].mean_sigma / report.mean_sigma)) " times those of all nine"
-                }
-            }
-            @if let Some(assumed) = report.assumed { dt { "assumed" } dd { (assumed) } }
-        }
-        @if report.turned_over {
-            dt { "mounted" } dd { "upside down compared with the publication (half a turn about x)" @if all { ": y and z change sign, and the table reaches all poses" } }
-        }
         @if let (Some(budget), true) = (&report.budget, all && report.noise.is_some()) { (limit(budget)) }
     } }
 }
@@ -172,33 +156,6 @@ fn sigma(report: &Design) -> Markup {
     }
 }
 
-/// Order of the dwells, and its cost in time.
-fn order(report: &Design) -> Markup {
-    let longer = report.moves_s - report.shortest_moves_s;
-    html! { @match report.order {
-        "shortest" => "shortest found; neighbouring dwells share drift (see --order)",
-        order => {
-            @if order == "randomised" { "in a randomised order, " } @else { "as published, " }
-            @if longer >= 0.05 { (minutes(longer)) " longer than the shortest found" } @else { "as short as the shortest found" }
-        }
-    } }
-}
-
-/// An effect that the design reveals or cannot reveal.
-fn noticed(notice: &Noticed) -> Markup {
-    let whole = notice.noticed == notice.parameters;
-    html! { @match notice.smallest {
-        None => { dt { "cannot notice" } dd { (notice.term) ": aliased with the model" } }
-        Some(size) => {
-            dt { @if whole { "can notice" } @else { "can notice in part" } }
-            dd {
-                (notice.term) " from " (significant(size)) " " (notice.unit) " on (9 times in 10)"
-                @if !whole { "; " (notice.noticed) " of " (notice.parameters) " directions" }
-            }
-        }
-    } }
-}
-
 /// Intervals of the parameters, one column for each sensor if they fit.
 fn parameters(report: &Design, level: Level) -> Markup {
     let most = if level.has_all() {
@@ -220,12 +177,12 @@ fn parameters(report: &Design, level: Level) -> Markup {
     let across = (columns() / width).clamp(1, 3);
     let rows = cells.len().div_ceil(across);
     let beside = match report.prior {
-        None => "(FS: full scale, the effect at full input)",
-        Some(_) => "[in brackets: by the population alone, without dwells]",
+        None => "",
+        Some(_) => " [in brackets: by the population alone, without dwells]",
     };
     html! {
         hr;
-        p { "95 % intervals if the noise is known " (beside) }
+        p { "95 % intervals if the noise is known" (beside) }
         @for row in 0..rows.min(most) {
             @let line = (0..across).filter_map(|c| cells.get(c * rows + row)).map(|cell| format!("{cell:<width$}"));
             pre { (line.collect::<String>().trim_end()) }
@@ -242,40 +199,6 @@ fn weak(report: &Design) -> Markup {
     html! { ul class="lines" data-head="warning: " { @for p in weak {
         li { (p.name) " is hardly observable: sigma " (significant(p.inflation)) " times that with the others known" }
     } } }
-}
-
-/// Result of `mimu design --compare`: one line per design.
-pub fn comparison_text(comparison: &Comparison) -> String {
-    let noticed = |design: &Design| {
-        let all = design.notices.iter().filter(|n| n.noticed == n.parameters);
-        let names: Vec<&str> = all.map(|n| n.term).collect();
-        match names.len() {
-            0 => "-".into(),
-            all if all > 1 && all == design.notices.len() => "all terms".into(),
-            _ => names.join(", "),
-        }
-    };
-    let assumed = comparison.designs.iter();
-    let assumed = assumed.filter_map(|design| Some((design.scheme?, design.assumed?)));
-    text(&html! {
-        @if let Some(first) = comparison.designs.first() {
-            p { (first.subject()) ": " (significant(first.dwell_s)) " s a dwell" }
-            section { p { "sigma of a dwell mean " (sigma(first)) } }
-        }
-        hr;
-        section {
-            (table("Designs side by side", &html! { th { "design" } th.n { "dwells" } th.n { "D-efficiency" } th.n { "mean sigma, ppm" } th.n { "time" } th.n { "dof" } th { "can notice" } }, &html! {
-                @for design in &comparison.designs { tr {
-                    td { (design.title) } td.n { (design.positions.len()) } td.n { (format!("{:.4}", design.d_efficiency)) } (number(design.mean_sigma_of_full_scale, 1e6))
-                    td.n { (minutes(design.time_s)) } td.n { (design.dof.lack_of_fit) } td { (noticed(design)) }
-                } }
-            }))
-            hr;
-            p { "mean sigma: geometric mean over the parameters, of full scale; dof: residual degrees of freedom; can notice: terms beyond the model that the residuals show in every direction" }
-            @if !comparison.out_of_reach.is_empty() { p { "out of this table's reach: " (comparison.out_of_reach.join(", ")) } }
-            dl class="aligned" { @for (scheme, assumed) in assumed { dt { (scheme) } dd { (assumed) } } }
-        }
-    })
 }
 
 /// Result of `mimu design --effects`.

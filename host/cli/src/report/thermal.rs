@@ -2,9 +2,8 @@
 
 use maud::{Markup, html};
 use mimu::parameter::ParameterKind;
-use mimu::quantity::{Sensor, plural, significant};
+use mimu::quantity::{Sensor, plural};
 use mimu::readable;
-use mimu_thermal::compare::{Comparison, Difference};
 use mimu_thermal::fit::FitVerdict;
 use mimu_thermal::result::{CurveResult, SensorResult, ThermalResult};
 
@@ -54,8 +53,7 @@ pub(super) fn document(result: &ThermalResult, level: Level, made: Option<&Made>
     html! {
         @if level.is_page() { h1 { (result.device) " over temperature" } }
         p {
-            (result.device) ": " (plural(result.recordings.len() as u64, "recording")) (format!(", dies at {from:.1} to {to:.1} °C, estimator "))
-            (result.estimator)
+            (result.device) ": " (plural(result.recordings.len() as u64, "recording")) (format!(", dies at {from:.1} to {to:.1} °C"))
         }
         // The judgement of a fit says it with the figures.
         @if level.has_all() || result.verdict != FitVerdict::Fitted {
@@ -170,33 +168,4 @@ fn curves(name: Sensor, result: &ThermalResult, level: Level) -> Markup {
         @let unit = readable::parameter(&curve.unit);
         tr { td { "  " (with_unit(curve.of, &unit)) } @for k in (0..count).map(at) { (interval(curve.value[k], 0.5 * (curve.upper[k] - curve.lower[k]), unit.factor)) } }
     } })) }
-}
-
-/// Result of `mimu thermal compare`: a summary, or with `verbose` everything.
-pub fn thermal_comparison_text(result: &Comparison, verbose: bool) -> String {
-    let [from, to] = result.range_c;
-    let [first, second] = result.lags_s.map(|lags| match lags {
-        None => "none".into(),
-        Some([both, same]) if both == same => format!("{} s", significant(both)),
-        Some([gyro, accel]) => format!(
-            "{} s (gyro), {} s (accelerometer)",
-            significant(gyro),
-            significant(accel)
-        ),
-    });
-    // A summary has scale factors and biases.
-    let inverse = |c: &Difference| c.name.contains("_C_") || c.name.contains("_o_");
-    let shown = result.curves.iter().filter(|c| verbose || !inverse(c));
-    let shown: Vec<&Difference> = shown.collect();
-    let said: Vec<String> = result.warnings.iter().map(ToString::to_string).collect();
-    text(&html! {
-        p { "second minus first, " (format!("dies at {from:.1} to {to:.1} °C; lags {first} and {second}")) }
-        (table("Second calibration minus the first", &html! { th {} th.n { "rms" } th.n { "largest" } th.n { "at °C" } th.n { "sigmas" } th { "unit" } }, &html! {
-            @for c in &shown { tr {
-                td { (c.name) } (number(c.rms, 1.0)) (number(c.largest[0], 1.0)) td.n { (format!("{:.1}", c.largest[1])) } (known(c.sigmas, 1.0)) td { (c.unit) }
-            } }
-        }))
-        (warnings(&said, Level::of(verbose), 0))
-        @if shown.len() < result.curves.len() { p.line { "next: --verbose prints " (result.curves.len() - shown.len()) " more numbers of C and o" } }
-    })
 }

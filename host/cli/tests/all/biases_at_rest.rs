@@ -118,7 +118,6 @@ fn everything_that_needs_a_calibration_refuses_the_file_by_its_name_and_says_wha
         "allan rec --calibration biases.toml -o out",
         "report --calibration biases.toml -o out",
         "compare biases.toml biases.toml",
-        "thermal compare biases.toml biases.toml",
         "thermal fit rec --base biases.toml -o out",
         "device upload biases.toml --port /dev/null",
         "device check --calibration biases.toml --port /dev/null",

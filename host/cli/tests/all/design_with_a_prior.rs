@@ -67,7 +67,7 @@ fn six_poses_are_designed_beside_the_population_alone() {
     );
     assert_eq!(design["prior"]["units"], 60);
     // The optimum depends on the number of dwells.
-    assert!(design["d_efficiency"].is_null() && design["optimum"]["determinant"].is_null());
+    assert!(design["d_efficiency"].is_null() && design["determinant"].is_null());
     let known = [
         ("C_yy", 1.96 * 0.008),
         ("C_zx", 1.96 * 4e-3),
@@ -144,16 +144,16 @@ fn without_a_number_the_plan_has_the_fewest_dwells_for_the_targets() {
 }
 
 #[test]
-fn a_budget_and_a_scheme_count_the_prior() {
+fn a_budget_and_six_faces_count_the_prior() {
     let folder = folder();
     let budget = json(folder.path(), "--prior kind.toml --budget 1");
     assert!(budget["time_s"].as_f64().unwrap() <= 60.0);
     let ways = budget["budget"]["ways"].as_array().unwrap();
     assert_eq!(ways[0]["dwells_a_pass"], 3);
-    let scheme = json(folder.path(), "--prior kind.toml --scheme six-face");
-    assert_eq!(scheme["undetermined"].as_array().unwrap().len(), 0);
+    let faces = json(folder.path(), "--prior kind.toml -n 6");
+    assert_eq!(faces["undetermined"].as_array().unwrap().len(), 0);
     // Faces do not show angles: these remain what the population says.
-    let all = scheme["sigma_per_parameter"].as_array().unwrap();
+    let all = faces["sigma_per_parameter"].as_array().unwrap();
     let angle = all.iter().find(|p| p["name"] == "C_zy").unwrap();
     let share = angle["half_width_95"].as_f64().unwrap()
         / angle["population_half_width_95"].as_f64().unwrap();
@@ -169,7 +169,6 @@ fn people_read_both_half_widths_in_a_hundred_columns() {
         "--prior kind.toml -n 6 --noise 0.001",
         "--prior unbiased.toml -n 20",
         "--prior kind.toml --budget 5",
-        "--prior kind.toml --scheme six-face",
     ] {
         let short = text(folder.path(), arguments);
         // The list of dwells is as long as the plan, three in a line.
@@ -204,9 +203,7 @@ fn what_a_prior_is_not_for_is_refused_by_its_name() {
         ("--prior kind.toml --table faces -n 9", 1, "leave --table out"),
         ("--prior kind.toml --reference table", 1, "--reference table with --prior"),
         ("--prior kind.toml --sensor gyro", 1, "turns between dwells"),
-        ("--prior kind.toml --compare", 1, "--scheme"),
         ("--prior kind.toml --effects accel_warm_up", 1, "leave --prior out"),
-        ("--prior kind.toml -n 12 --model affine,quadratic", 1, "leave --model out"),
         ("--prior kind.toml -n 12 --rates 100", 1, "at rest"),
         ("--prior kind.toml -n 2", 1, "at least 3"),
         ("--prior gyro.toml", 1, "gyro.toml: it has no accelerometer"),

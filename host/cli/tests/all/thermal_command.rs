@@ -130,8 +130,8 @@ fn niu_s_unit_gets_curves_and_lags_that_hold_the_truth_and_another_run_agrees() 
     for (short, verbose) in [
         (fit, "thermal fit niu --verify again --verbose"),
         (
-            "thermal compare cal.toml again.toml",
-            "thermal compare cal.toml again.toml --verbose",
+            "compare cal.toml again.toml",
+            "compare cal.toml again.toml --verbose",
         ),
     ] {
         let [short, all] = [short, verbose].map(|arguments| done(folder, arguments));
@@ -157,9 +157,11 @@ fn niu_s_unit_gets_curves_and_lags_that_hold_the_truth_and_another_run_agrees() 
         );
     }
 
-    let same = done(folder, "thermal compare cal.toml cal.toml --json -");
+    let same = done(folder, "compare cal.toml cal.toml --json -");
     let same: Value = serde_json::from_str(&same).unwrap();
-    assert_eq!(same["format"], "mimu-thermal-comparison/1");
+    let at_ends = same["parameters"].as_array().unwrap().iter();
+    let at_ends = at_ends.filter(|p| p["name"].as_str().unwrap().ends_with("°C"));
+    assert_eq!(at_ends.count(), 24);
 
     // The error after a fit at one temperature is shown beside it.
     done(folder, "fit niu -o one.toml");

@@ -10,6 +10,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use super::Calibration;
 use crate::judgement::Judgement;
 use crate::quantity::{AXES, Sensor};
+use crate::triad::Forward;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{RawUnit, are_two_units};
 
@@ -101,7 +102,8 @@ pub fn compare(all: &[(String, Calibration)]) -> Result<Comparison> {
             ));
         }
     }
-    let each: Vec<Vec<Named>> = all.iter().map(|(_, c)| parameters(c)).collect();
+    let ends = common_ends(all, &mut notes);
+    let each: Vec<Vec<Named>> = all.iter().map(|(_, c)| parameters(c, &ends)).collect();
     let mut parameters = Vec::new();
     for (sensor, name, unit, ..) in &each[0] {
         let of = |one: &Vec<Named>| -> Option<(f64, Option<f64>)> {
@@ -211,8 +213,45 @@ fn mark_changes(parameters: &mut [ComparedParameter]) {
     }
 }
 
-/// Physical parameters and coefficients of effects.
-fn parameters(calibration: &Calibration) -> Vec<Named> {
+/// Lower and upper end of the temperatures that all of several calibrations over temperature cover, °C; none if one has no curves.
+fn common_ends(all: &[(String, Calibration)], notes: &mut Vec<String>) -> Vec<f64> {
+    let ranges = all
+        .iter()
+        .map(|(_, c)| Some(c.temperature.as_ref()?.range_c));
+    let Some(ranges) = ranges.collect::<Option<Vec<_>>>() else {
+        return Vec::new();
+    };
+    let low = ranges
+        .iter()
+        .map(|r| r[0])
+        .fold(f64::NEG_INFINITY, f64::max);
+    let high = ranges.iter().map(|r| r[1]).fold(f64::INFINITY, f64::min);
+    if low < high {
+        return vec![low, high];
+    }
+    notes.push("their curves have no temperature in common".into());
+    Vec::new()
+}
+
+/// Scale factors and biases of a calibration over temperature at `temp_c` of the dies.
+fn at_temperature(calibration: &Calibration, sensor: Sensor, temp_c: f64) -> Option<[Values; 2]> {
+    let over = calibration.temperature.as_ref()?;
+    let model = Forward::of(&calibration.inverse_at(sensor, temp_c)?)?;
+    let scale = [0, 1, 2].map(|k| model.matrix.row(k).norm());
+    Some([
+        (scale, over.sigmas(sensor, temp_c, |t| t.sigma_scale_factor)),
+        (
+            model.bias.into(),
+            over.sigmas(sensor, temp_c, |t| t.sigma_bias),
+        ),
+    ])
+}
+
+/// Values of x, y, z and their standard deviations.
+type Values = ([f64; 3], Option<[f64; 3]>);
+
+/// Physical parameters, at `temperatures` too, and coefficients of effects.
+fn parameters(calibration: &Calibration, temperatures: &[f64]) -> Vec<Named> {
     let mut all = Vec::new();
     for sensor in Sensor::BOTH {
         let Some(table) = calibration.table(sensor) else {
@@ -232,11 +271,11 @@ fn parameters(calibration: &Calibration) -> Vec<Named> {
             (
                 "scale factor",
                 &AXES,
-                gain,
+                gain.clone(),
                 p.scale_factor,
                 p.sigma_scale_factor,
             ),
-            ("bias", &AXES, raw, p.bias, p.sigma_bias),
+            ("bias", &AXES, raw.clone(), p.bias, p.sigma_bias),
             (
                 "misalignment",
                 &AXES,
@@ -257,6 +296,20 @@ fn parameters(calibration: &Calibration) -> Vec<Named> {
                 let name = format!("{kind} {}", names[i]);
                 let sigma = sigmas.map(|s| s[i]);
                 all.push((sensor, name, unit.clone(), values[i], sigma));
+            }
+        }
+        for temp_c in temperatures {
+            let Some([scale, bias]) = at_temperature(calibration, sensor, *temp_c) else {
+                continue;
+            };
+            for (kind, unit, (values, sigmas)) in
+                [("scale factor", &gain, scale), ("bias", &raw, bias)]
+            {
+                for (i, axis) in AXES.iter().enumerate() {
+                    let name = format!("{kind} {axis} at {temp_c:.1} °C");
+                    let sigma = sigmas.map(|s| s[i]);
+                    all.push((sensor, name, unit.clone(), values[i], sigma));
+                }
             }
         }
     }

@@ -169,6 +169,23 @@ impl OverTemperature {
         self.nodes.iter().any(|node| node.table(sensor).is_some())
     }
 
+    /// Standard deviations of x, y, z that `of` picks from a node, interpolated linearly between the nodes next to `temp_c`.
+    pub fn sigmas(
+        &self,
+        sensor: Sensor,
+        temp_c: f64,
+        of: impl Fn(&NodeTable) -> Option<[f64; 3]>,
+    ) -> Option<[f64; 3]> {
+        let at = |node: &TemperatureNode| Some((node.temp_c, of(node.table(sensor)?)?));
+        let after = self.nodes.partition_point(|node| node.temp_c < temp_c);
+        let last = self.nodes.len().checked_sub(1)?;
+        let (cold_c, cold) = at(&self.nodes[after.saturating_sub(1)])?;
+        let (warm_c, warm) = at(&self.nodes[after.min(last)])?;
+        let share = (temp_c - cold_c) / (warm_c - cold_c).max(f64::MIN_POSITIVE);
+        let share = share.clamp(0.0, 1.0);
+        Some([0, 1, 2].map(|k| cold[k] + share * (warm[k] - cold[k])))
+    }
+
     /// Refuses what cannot be applied; a bad node is named by its number, from 1. `has`: the sensors of the calibration.
     pub(super) fn check(&self, place: &str, has: PerSensor<bool>) -> Result<()> {
         const AGAIN: &str = "fit the recordings over temperature again";

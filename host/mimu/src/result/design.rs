@@ -10,10 +10,9 @@ use super::TOOL;
 use crate::plan::design::Problem;
 use crate::plan::design::budget::{Budget, DwellNoise, Spending};
 use crate::plan::design::judgement::Judgement;
-use crate::plan::design::model::{Setting, Term};
+use crate::plan::design::model::Setting;
 use crate::plan::design::reach::Fixture;
-use crate::plan::design::schemes::{FANG_FILTERS, Scheme};
-use crate::plan::design::tour::{Motion, Order};
+use crate::plan::design::tour::{Motion, RANDOMISED};
 use crate::plan::{Plan, Step};
 use crate::quantity::{Sensor, minutes, significant};
 use beside_population::BesidePopulation;
@@ -25,7 +24,7 @@ const SAMPLE_RATE_HZ: f64 = 1000.0;
 /// Conditions under which a design is judged.
 #[derive(Debug, Clone)]
 pub struct Conditions {
-    /// Title, such as `best of 9 dwells found (seed 1)` or `scheme fang-nine`.
+    /// Title, such as `best of 9 dwells found (seed 1)`.
     pub title: String,
     /// Length of a dwell, s.
     pub dwell_s: f64,
@@ -35,10 +34,6 @@ pub struct Conditions {
     pub assumed_noise: Option<&'static str>,
     /// Moves between the dwells.
     pub motion: Motion,
-    /// Order of the dwells; `None` as published.
-    pub order: Option<Order>,
-    /// Time of the moves in the shortest order found, s.
-    pub shortest_moves_s: f64,
 }
 
 /// A judged design: the result of `mimu design`, `mimu-design/1`.
@@ -54,8 +49,6 @@ pub struct Design {
     pub sensor: Sensor,
     /// What is known of the input.
     pub reference: Reference,
-    /// `affine`, and other terms.
-    pub model: String,
     /// Fixture, as on the command line.
     pub table: &'static str,
     /// Direction in the body frame that points up, for each dwell in order.
@@ -64,14 +57,10 @@ pub struct Design {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rates_dps: Option<Vec<f64>>,
     /// D-efficiency against the continuous optimum over the reach: 1 is the best possible, 0 is singular. With a prior not a number, null in JSON, as
-    /// are `determinant` and `optimum`: the optimum then depends on the number of dwells and their noise.
+    /// is `determinant`: the optimum then depends on the number of dwells and their noise.
     pub d_efficiency: f64,
     /// `det(F'F/n)`, fang (22).
     pub determinant: f64,
-    /// Number of sensors in this product of determinants: 1 if all sensors have the same regressors.
-    pub regressions: usize,
-    /// Optimum, which no design exceeds.
-    pub optimum: Best,
     /// Largest over smallest singular value of F; infinite, null in JSON, if singular.
     pub condition: f64,
     /// Sigma of each parameter of the triad.
@@ -85,8 +74,6 @@ pub struct Design {
     pub undetermined: Vec<String>,
     /// Residual degrees of freedom.
     pub dof: Freedom,
-    /// How well it would notice the terms that the model lacks.
-    pub notices: Vec<Noticed>,
     /// Length of a dwell, s.
     pub dwell_s: f64,
     /// Sigma of a dwell mean, SI.
@@ -96,23 +83,12 @@ pub struct Design {
     /// Whose noise was assumed, because none was given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub assumed_noise: Option<&'static str>,
-    /// `published`, `shortest` or `randomised`.
+    /// `randomised`.
     pub order: &'static str,
-    /// Whether the unit had to be turned over for the table to reach the scheme's poses: see [`Fixture::holding`].
-    pub turned_over: bool,
     /// Time of the moves between the dwells, s.
     pub moves_s: f64,
-    /// The same in the shortest order found, s.
-    pub shortest_moves_s: f64,
     /// Time of all dwells and moves, s.
     pub time_s: f64,
-    /// Name of the published scheme that it is.
-    pub scheme: Option<&'static str>,
-    /// Assumptions about this scheme.
-    pub assumed: Option<&'static str>,
-    /// fang's filters for x, y and z with four positions each, if fang's scheme was judged.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub filters: Option<[Filter; 3]>,
     /// Ways to spend a budget.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub budget: Option<Spent>,
@@ -123,15 +99,6 @@ pub struct Design {
     settings: Vec<Setting>,
     #[serde(skip)]
     fixture: Fixture,
-}
-
-/// The continuous optimum over the reach.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Best {
-    /// `det(F'F/n)` of it.
-    pub determinant: f64,
-    /// Excess over the bound of the equivalence theorem: it limits the distance to the optimum.
-    pub excess: f64,
 }
 
 /// A value and its unit.
@@ -146,7 +113,7 @@ pub struct Quantity {
 /// How well a parameter is determined.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ParameterSigma {
-    /// `b_x`, `P_xy`, `C_yx`, `quadratic_z`, ...
+    /// `b_x`, `P_xy`, `C_yx`, ...
     pub name: String,
     /// Sigma, SI; infinite, null in JSON, if it is not determined.
     pub value: f64,
@@ -163,7 +130,7 @@ pub struct ParameterSigma {
     pub inflation: f64,
 }
 
-/// Half of a 95 % interval in the unit of data sheets. Shares of full scale refer to the full input of the design.
+/// Half of a 95 % interval in the unit of data sheets.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DataSheet {
     /// Half width in that unit.
@@ -171,7 +138,7 @@ pub struct DataSheet {
     /// The same before the first dwell, by the prior alone.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub population_half_width_95: Option<f64>,
-    /// mg, deg/s, ppm, µrad, ppm FS, (deg/s)/g.
+    /// mg, deg/s, ppm, µrad.
     pub unit: Cow<'static, str>,
 }
 
@@ -182,32 +149,6 @@ pub struct Freedom {
     pub lack_of_fit: usize,
     /// From repeated inputs: these show the noise, whatever the model.
     pub repetition: usize,
-}
-
-/// How well the design would notice a term that the model lacks.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Noticed {
-    /// Name of the term.
-    pub term: &'static str,
-    /// Number of its parameters.
-    pub parameters: usize,
-    /// How many directions among them leave a trace in the residuals.
-    pub noticed: usize,
-    /// Smallest size that is noticed 9 times in 10, of the parameter that is noticed worst; `None`: aliased with the model.
-    pub smallest: Option<f64>,
-    /// Unit of that: ppm FS or (deg/s)/g.
-    pub unit: &'static str,
-}
-
-/// A filter of fang's three, judged by its own positions.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Filter {
-    /// As [`Design::d_efficiency`].
-    pub d_efficiency: f64,
-    /// As [`Design::determinant`].
-    pub determinant: f64,
-    /// As [`Design::mean_sigma`].
-    pub mean_sigma: f64,
 }
 
 /// How a budget is spent, and the alternatives.
@@ -289,23 +230,6 @@ impl Design {
                 inflation: p.inflation,
             }
         });
-        let optimum = match alone {
-            Some(_) => f64::NAN,
-            None => problem.optimum.log_det.exp(),
-        };
-        let notices = judgement.notices.iter().map(|notice| {
-            let (factor, unit) = match notice.term {
-                Term::GSensitivity => (sigma.to_degrees(), "(deg/s)/g"),
-                _ => (1e6 * sigma / model.span.min(), "ppm FS"),
-            };
-            Noticed {
-                term: notice.term.name(),
-                parameters: notice.parameters,
-                noticed: notice.noticed,
-                smallest: notice.size.map(|s| s * factor),
-                unit,
-            }
-        });
         let settings = judgement.settings.iter();
         let moves_s = conditions.motion.moves_s(&judgement.settings);
         Self {
@@ -314,18 +238,12 @@ impl Design {
             title: conditions.title,
             sensor: model.sensor,
             reference: model.reference,
-            model: model.to_string(),
             table: problem.reach.fixture.name(),
             positions: settings.clone().map(|s| s.up.into()).collect(),
             rates_dps: (model.sensor == Sensor::Gyro)
                 .then(|| settings.map(|s| s.rate.to_degrees()).collect()),
             d_efficiency: judgement.d_efficiency,
             determinant: judgement.determinant,
-            regressions: model.distinct_regressions(),
-            optimum: Best {
-                determinant: optimum,
-                excess: problem.optimum.excess,
-            },
             condition: judgement.condition,
             sigma_per_parameter: parameters.collect(),
             mean_sigma: judgement.mean_sigma,
@@ -336,7 +254,6 @@ impl Design {
                 lack_of_fit: judgement.lack_of_fit_dof,
                 repetition: judgement.repetition_dof,
             },
-            notices: notices.collect(),
             dwell_s: conditions.dwell_s,
             dwell_sigma: Quantity {
                 value: sigma,
@@ -344,40 +261,14 @@ impl Design {
             },
             noise: conditions.noise,
             assumed_noise: conditions.assumed_noise,
-            order: conditions.order.map_or("published", Order::name),
-            turned_over: false,
+            order: RANDOMISED,
             moves_s,
-            shortest_moves_s: conditions.shortest_moves_s,
             time_s: moves_s + conditions.dwell_s * judgement.settings.len() as f64,
-            scheme: None,
-            assumed: None,
-            filters: None,
             budget: None,
             prior: None,
             fixture: problem.reach.fixture,
             settings: judgement.settings,
         }
-    }
-
-    /// The same, marked as a published scheme. `turned_over`: the unit has to be turned over for it.
-    pub fn of_scheme(mut self, problem: &Problem, scheme: Scheme, turned_over: bool) -> Self {
-        let model = &problem.reach.model;
-        let as_published = model.terms.is_empty() && model.reference == Reference::Table;
-        self.filters = (scheme == Scheme::FangNine && as_published).then(|| {
-            FANG_FILTERS.map(|filter| {
-                let settings = filter.map(|i| self.settings[i]);
-                let judged = problem.judge(&settings, self.dwell_sigma.value);
-                Filter {
-                    d_efficiency: judged.d_efficiency,
-                    determinant: judged.determinant,
-                    mean_sigma: judged.mean_sigma,
-                }
-            })
-        });
-        self.scheme = Some(scheme.name());
-        self.assumed = scheme.assumed();
-        self.turned_over = turned_over;
-        self
     }
 
     /// The same, marked as the best way to spend a budget with this noise.
@@ -402,10 +293,7 @@ impl Design {
             Reference::Table => "known input",
             Reference::Gravity | Reference::TurntableRate => "magnitude of gravity",
         };
-        format!(
-            "{}, {}, {reference}, {}",
-            self.sensor, self.model, self.table
-        )
+        format!("{}, {reference}, {}", self.sensor, self.table)
     }
 
     /// Plan of the design, `mimu-plan/1`, with moves at `slew` rad/s.
@@ -415,42 +303,14 @@ impl Design {
             None => format!("D-efficiency {:.4}", self.d_efficiency),
         };
         let about = format!(
-            "{}: {}\norder {}{}\n{quality}, {} with moves at {} deg/s",
+            "{}: {}\n{quality}, {} in a randomised order with moves at {} deg/s",
             self.subject(),
             self.title,
-            self.order,
-            if self.turned_over {
-                ", unit turned over about x"
-            } else {
-                ""
-            },
             minutes(self.time_s),
             significant(slew.to_degrees()),
         );
         let settings = self.settings.iter();
         let steps = settings.map(|s| Step::of(s, self.dwell_s)).collect();
         Plan::new(self.fixture, SAMPLE_RATE_HZ, steps).to_toml(&about)
-    }
-}
-
-/// Published schemes beside the best designs of as many dwells: the result of `mimu design --compare`.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Comparison {
-    /// `mimu-design-comparison/1`.
-    pub format: &'static str,
-    /// The designs.
-    pub designs: Vec<Design>,
-    /// Names of the schemes that the table cannot hold.
-    pub out_of_reach: Vec<&'static str>,
-}
-
-impl Comparison {
-    /// The comparison of `designs`.
-    pub fn new(designs: Vec<Design>, out_of_reach: &[Scheme]) -> Self {
-        Self {
-            format: "mimu-design-comparison/1",
-            designs,
-            out_of_reach: out_of_reach.iter().map(|s| s.name()).collect(),
-        }
     }
 }

@@ -17,7 +17,6 @@ use crate::quantity::{Figure, PerSensor, Sensor, present, raw_unit};
 use crate::recording_problem::OfRecording;
 use crate::signal::dwell::Dwell;
 use crate::signal::stillness::Detection;
-use crate::triad::{Angles, Estimate};
 use crate::unseen::Test;
 use crate::warning::Warning;
 
@@ -161,8 +160,6 @@ pub struct SensorFitResult {
     /// Delay of the readings of x, y, z behind the reference, s, corrected in the fit; absent if no input moves within a dwell.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub delay_s: Option<Triple>,
-    /// The physical quantities to first order in the angles, fang (14): for comparison with what others publish.
-    pub small_angle: SmallAngle,
     /// By group of observations, whether noise explains their residuals.
     pub scatter: BTreeMap<String, ScatterResult>,
     /// How the dwells were held out: contiguous `blocks`, or `interleaved` if the rest without one of these does not determine the
@@ -209,19 +206,6 @@ pub struct Triple {
     pub value: [f64; 3],
     /// Standard deviations.
     pub sigma: [f64; 3],
-}
-
-/// Physical quantities to first order in the angles.
-#[derive(Debug, Clone, Copy, Serialize)]
-pub struct SmallAngle {
-    /// Scale factors, raw per SI.
-    pub scale: Triple,
-    /// Biases, raw.
-    pub bias: Triple,
-    /// θx, θy, θz, rad.
-    pub misalignment_rad: Triple,
-    /// βyz, βzy, βzx, rad.
-    pub non_orthogonality_yz_zy_zx_rad: Triple,
 }
 
 /// Whether noise explains residuals.
@@ -357,7 +341,6 @@ impl SensorFitResult {
             held_out: r.held_out.map(Into::into),
             floor: r.floor,
         });
-        let small = found.estimated.triad.physical(Angles::Small);
         Self {
             estimator: fit.estimator(found.sensor),
             parameters: Parameter::list(fit, found),
@@ -375,12 +358,6 @@ impl SensorFitResult {
                 value: d.value.into(),
                 sigma: d.sigma.into(),
             }),
-            small_angle: SmallAngle {
-                scale: Triple::of(&small.scale),
-                bias: Triple::of(&small.bias),
-                misalignment_rad: Triple::of(&small.misalignment),
-                non_orthogonality_yz_zy_zx_rad: Triple::of(&small.non_orthogonality),
-            },
             scatter: scatter.collect(),
             held_out: found.held_out.split,
             held_out_parts: found.held_out.count,
@@ -426,14 +403,5 @@ fn extra_sigma_unit(fit: &Fit, found: &SensorFit, group: Observable) -> String {
             found.figure.unit(found.sensor).into()
         }
         Figure::Input => raw_unit(fit.prepared.manifest.raw_unit, si),
-    }
-}
-
-impl Triple {
-    fn of(estimates: &[Estimate; 3]) -> Self {
-        Self {
-            value: estimates.map(|e| e.value),
-            sigma: estimates.map(|e| e.sigma),
-        }
     }
 }

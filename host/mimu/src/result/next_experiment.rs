@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::TOOL;
-use crate::plan::design::tour::Order;
+use crate::plan::design::tour::RANDOMISED;
 use crate::plan::next_experiment::recipe::Course;
 use crate::plan::next_experiment::{Answer, Setup};
 use crate::plan::round;
@@ -131,7 +131,7 @@ impl NextExperiment {
             sigma_per_parameter: sigmas.collect(),
             dwell_s: experiment.dwell_s,
             dwell_sigma: dwell_sigma.collect(),
-            order: Order::Randomised.name(),
+            order: RANDOMISED,
             time_s: experiment.time_s,
         }
     }

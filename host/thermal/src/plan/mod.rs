@@ -195,7 +195,7 @@ fn check_span(kelvin: f64, shape: Shape) -> Result<&'static str> {
         return refuse(SLOPE_SPAN, what, "widen the range");
     }
     match shape {
-        Shape::Line | Shape::Constant => Ok("line"),
+        Shape::Line => Ok("line"),
         _ if kelvin < CURVATURE_SPAN => {
             let what = "below that span the slope looks like curvature, which";
             let error = refuse(

@@ -4,7 +4,7 @@ use mimu::calibration::thermal_biases::ThermalBiases;
 use mimu::judgement::JudgementKind;
 use mimu::quantity::Sensor;
 use mimu::{Manifest, RawUnit, Reference, Samples};
-use mimu_thermal::fit::{Estimator, FitVerdict, Options, ThermalFit, fit};
+use mimu_thermal::fit::{FitVerdict, Options, ThermalFit, fit};
 use mimu_thermal::result::ThermalResult;
 use mimu_thermal::warning::Warning;
 use nalgebra::Vector3;
@@ -14,7 +14,6 @@ use crate::session;
 use crate::simulation::{Experiment, GAIN, GRAVITY, RATE_HZ, Random, WHITE, truth};
 
 pub const JOINT: Options = Options {
-    estimator: Estimator::Joint,
     lag_s: None,
     range_c: None,
 };

@@ -1,19 +1,18 @@
 //! The whole path of `mimu thermal fit`: verdicts, held-out errors, and the calibration file.
 
 use mimu::calibration::Calibration;
+use mimu::calibration::comparison::compare;
 use mimu::quantity::Sensor;
-use mimu_thermal::classic::Classic;
-use mimu_thermal::compare::compare;
-use mimu_thermal::fit::{Estimator, FitVerdict, Options, ThermalFit, fit};
+use mimu_thermal::fit::{FitVerdict, Options, ThermalFit, fit};
 use mimu_thermal::judge::rms;
 use mimu_thermal::result::ThermalResult;
 use nalgebra::Vector3;
 
+use crate::classic::{Classic, estimate};
 use crate::session;
 use crate::simulation::{Experiment, GAIN, truth};
 
 const JOINT: Options = Options {
-    estimator: Estimator::Joint,
     lag_s: None,
     range_c: None,
 };
@@ -177,16 +176,9 @@ fn a_soak_finds_all_parameters_and_as_printed_only_scale_factors_and_biases() {
         corners: corners.collect(),
         ..Experiment::ramp(60.0, true)
     };
-    let full = fitted(
-        &soak,
-        17,
-        Options {
-            estimator: Estimator::Classic(Classic::Soak),
-            ..JOINT
-        },
-    );
-    assert_eq!(ThermalResult::of(&full).verdict, FitVerdict::Fitted);
-    let curves = full.joint.curves.accel.as_ref().unwrap();
+    let full = estimate(&[session(soak.record(17)).unwrap()], Classic::Soak).unwrap();
+    assert!(!full.one_way);
+    let curves = full.curves.accel.as_ref().unwrap();
     for t in [0.0, 30.0, 60.0] {
         let [model, _] = curves.forward(t);
         let (matrix, bias) = truth(1, t);
@@ -202,14 +194,22 @@ fn a_soak_finds_all_parameters_and_as_printed_only_scale_factors_and_biases() {
 }
 
 #[test]
-fn a_calibration_differs_from_itself_in_nothing_and_from_another_run_by_its_sigmas() {
+fn a_calibration_differs_from_itself_in_nothing_and_from_another_run_by_its_sigmas_at_both_ends() {
     let [a, b] = [18, 19].map(|seed| {
         let found = fitted(&Experiment::ramp(60.0, true), seed, JOINT);
-        found.calibration("2026-01-01T00:00:00Z").unwrap()
+        let made = found.calibration("2026-01-01T00:00:00Z").unwrap();
+        (seed.to_string(), made)
     });
-    assert!(compare(&a, &a).unwrap().curves.iter().all(|c| c.rms == 0.0));
-    let differences = compare(&a, &b).unwrap().curves;
-    let sigmas: Vec<f64> = differences.iter().filter_map(|c| c.sigmas).collect();
+    let same = compare(&[a.clone(), a.clone()]).unwrap();
+    assert!(same.parameters.iter().all(|p| p.spread == 0.0));
+    let differences = compare(&[a, b]).unwrap().parameters;
+    let at_ends = differences.iter().filter(|p| p.name.ends_with("°C"));
+    let sigmas: Vec<f64> = at_ends
+        .map(|p| {
+            let (difference, half) = p.difference().unwrap();
+            1.96 * difference / half.unwrap()
+        })
+        .collect();
     let mean = (sigmas.iter().map(|s| s * s).sum::<f64>() / sigmas.len() as f64).sqrt();
     assert!(sigmas.len() == 24 && (0.5..1.6).contains(&mean), "{mean}");
 }

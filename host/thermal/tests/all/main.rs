@@ -2,10 +2,15 @@
 
 mod at_rest;
 mod base;
+#[allow(dead_code)] // the studies use the rest
+#[path = "../../../../tests/thermal/classic.rs"]
+mod classic;
 mod coverage;
 mod estimates;
 mod judged;
 mod plan;
+#[path = "../../../../tests/thermal/points.rs"]
+mod points;
 mod refused;
 #[path = "../../../../tests/thermal/simulation.rs"]
 mod simulation;

@@ -1,11 +1,10 @@
 //! A soak: the temperature is constant, is measured, and changes again at once.
 
 use mimu::quantity::Sensor;
-use mimu_thermal::classic::Classic;
 use mimu_thermal::curves::TriadCurves;
-use mimu_thermal::fit::{Estimator, Options, fit};
 use nalgebra::Matrix3;
 
+use crate::classic::{Classic, estimate};
 use crate::session;
 use crate::simulation::{GAIN, truth};
 use crate::soak;
@@ -14,14 +13,9 @@ use crate::soak;
 fn the_end_of_a_soak_is_a_plateau_though_the_next_ramp_follows_at_once() {
     let recording = session(soak::record(60.0, 1)).unwrap();
     assert!((recording.thermometer.duration_s() - 3600.0 * soak::HOURS).abs() < 1.0);
-    let options = Options {
-        estimator: Estimator::Classic(Classic::Soak),
-        lag_s: None,
-        range_c: None,
-    };
-    let found = fit(vec![recording], &[], options).unwrap();
+    let found = estimate(&[recording], Classic::Soak).unwrap();
     for sensor in [0, 1] {
-        let curves = found.joint.curves[Sensor::BOTH[sensor]].as_ref().unwrap();
+        let curves = found.curves[Sensor::BOTH[sensor]].as_ref().unwrap();
         let [low, high] = curves.range_c;
         assert!((low + 10.0).abs() < 0.1 && (high - 70.0).abs() < 0.1);
         for temp_c in [-10.0, 30.0, 70.0] {
@@ -39,15 +33,9 @@ fn the_end_of_a_soak_is_a_plateau_though_the_next_ramp_follows_at_once() {
 fn with_m_constant_each_row_is_that_of_25_degrees_times_a_scale_factor_that_follows_the_temperature()
  {
     let recording = session(soak::record(60.0, 1)).unwrap();
-    let options = Options {
-        estimator: Estimator::Classic(Classic::SoakConstantM),
-        lag_s: None,
-        range_c: None,
-    };
-    let found = fit(vec![recording], &[], options).unwrap();
-    let of = |sensor: usize| -> &TriadCurves {
-        found.joint.curves[Sensor::BOTH[sensor]].as_ref().unwrap()
-    };
+    let found = estimate(&[recording], Classic::SoakConstantM).unwrap();
+    let of =
+        |sensor: usize| -> &TriadCurves { found.curves[Sensor::BOTH[sensor]].as_ref().unwrap() };
     for sensor in [0, 1] {
         // The set points are 10 K apart; 20 and 30 °C are equally far from 25 °C.
         let rows = |p: Matrix3<f64>| Matrix3::from_fn(|i, j| p[(i, j)] / p[(i, i)]);

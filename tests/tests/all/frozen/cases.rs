@@ -516,9 +516,6 @@ fn thermal(cases: &mut Cases) {
         );
         twice(bench, &plan, &warm(4), 4);
         bench.mimu("thermal fit a --verify b -o cal.toml");
-        for estimator in ["cubic", "nodes"] {
-            bench.mimu(&format!("thermal fit a --estimator {estimator}"));
-        }
         bench
             .mimu("verify b --calibration cal.toml")
             .mimu("fit a")
@@ -537,9 +534,7 @@ fn thermal(cases: &mut Cases) {
         ];
         let plan = in_chamber(4, Some(600.0), 10.0, &chamber);
         bench.recorded("a", &plan, &warm(5), 5);
-        for estimator in ["joint", "soak", "soak-constant-m"] {
-            bench.mimu(&format!("thermal fit a --estimator {estimator}"));
-        }
+        bench.mimu("thermal fit a");
     });
     cases.add("thermal", "niu, Earth", |bench| {
         let mut random = Random::new(13, "the Earth's rate");
@@ -547,9 +542,7 @@ fn thermal(cases: &mut Cases) {
         let plan = earth::plan(Experiment::Ramp, 48.0, &mut random);
         let plan = plan.replace("sample_rate_hz = 50", "sample_rate_hz = 20");
         bench.recorded("a", &plan, &file, 13);
-        for estimator in ["joint", "ramp-niu"] {
-            bench.mimu(&format!("thermal fit a --estimator {estimator}"));
-        }
+        bench.mimu("thermal fit a");
     });
     cases.add("thermal", "at rest", |bench| {
         let plan = rest(1500.0).replace("100.0", "10.0").replace(
@@ -596,9 +589,6 @@ fn designs(cases: &mut Cases) {
         "design -n 12",
         "design --sensor gyro -n 14 --rates 50,200",
         "design --table hand -n 14",
-        "design --scheme fang-nine",
-        "design --sensor gyro --scheme xu-rates",
-        "design -n 18 --model affine,quadratic",
         "design --effects gyro_g_sensitivity,accel_scale_quadratic",
         "thermal plan --procedure soak --range=-10..50",
         "thermal plan --procedure ramp --range=-10..50",

@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use serde_json::{Map, Number, Value};
 
 /// Keys that are not frozen: where and when, what the recording states, and what other numbers give.
-const SKIPPED: [&str; 31] = [
+const SKIPPED: [&str; 30] = [
     "tool",
     "created",
     "sha256",
@@ -33,8 +33,6 @@ const SKIPPED: [&str; 31] = [
     "duration_s",
     "step",
     "temp_c",
-    // The parameters in another form, to first order.
-    "small_angle",
     // Their figures are `rms`, `held_out_rms`, `noise_floor` and `scatter`.
     "residuals",
     // `verify` on the same recording is a command of its own.

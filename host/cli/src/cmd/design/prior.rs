@@ -48,13 +48,6 @@ impl DesignArgs {
                 "leave --prior out",
             );
         }
-        if self.compare {
-            return refuse(
-                "--compare".into(),
-                "schemes are compared by their D-efficiency, which a prior makes depend on the number and the noise of the dwells",
-                "judge one scheme, --scheme, or leave --prior out",
-            );
-        }
         if self.sensor() == Sensor::Gyro {
             return refuse(
                 "--sensor gyro".into(),
@@ -78,13 +71,6 @@ impl DesignArgs {
                 format!("--table {name}"),
                 by_hand,
                 "leave --table out, or --prior: on a table, known inputs determine every parameter without it",
-            );
-        }
-        if !self.model.is_affine() {
-            return refuse(
-                "--model".into(),
-                "a prior is of the affine parameters, and a fit with it has no others",
-                "leave --model out, or --prior",
             );
         }
         Ok(())

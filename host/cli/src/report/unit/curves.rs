@@ -75,7 +75,10 @@ fn drawn(over: &OverTemperature, curves: &Curves, sensor: Sensor, kind: Paramete
         let factor = if scale { 1e6 } else { unit.factor } / gain(middle);
         let points = models.iter().enumerate().map(|(k, model)| {
             let (temp_c, value) = (temperature(k), (of(model) - of(middle)) * factor);
-            let half = sigma(over, sensor, scale, axis, temp_c).map(|s| NORMAL_95 * s * factor);
+            let sigmas = over.sigmas(sensor, temp_c, |t| {
+                [t.sigma_bias, t.sigma_scale_factor][usize::from(scale)]
+            });
+            let half = sigmas.map(|s| NORMAL_95 * s[axis] * factor);
             (temp_c, value, half.map(|half| [value - half, value + half]))
         });
         (AXES[axis].to_string(), points.collect())
@@ -85,25 +88,4 @@ fn drawn(over: &OverTemperature, curves: &Curves, sensor: Sensor, kind: Paramete
     let what = kind.words();
     let drawn = changes(&format!("{sensor} {what}"), name, over.range_c, &curves);
     panel(&format!("{sensor}: {what} over temperature"), &drawn)
-}
-
-/// Standard deviation, raw, interpolated linearly between the nodes next to `temp_c`.
-fn sigma(
-    over: &OverTemperature,
-    sensor: Sensor,
-    scale: bool,
-    axis: usize,
-    temp_c: f64,
-) -> Option<f64> {
-    let of = |node: &TemperatureNode| {
-        let table = node.table(sensor)?;
-        let sigmas = [table.sigma_bias, table.sigma_scale_factor][usize::from(scale)]?;
-        Some((node.temp_c, sigmas[axis]))
-    };
-    let after = over.nodes.partition_point(|node| node.temp_c < temp_c);
-    let last = over.nodes.len().checked_sub(1)?;
-    let (cold_c, cold) = of(&over.nodes[after.saturating_sub(1)])?;
-    let (warm_c, warm) = of(&over.nodes[after.min(last)])?;
-    let share = (temp_c - cold_c) / (warm_c - cold_c).max(f64::MIN_POSITIVE);
-    Some(cold + share.clamp(0.0, 1.0) * (warm - cold))
 }

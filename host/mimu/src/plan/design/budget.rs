@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use super::model::Setting;
 use super::problem::Problem;
-use super::tour::{Motion, Order, randomised};
+use super::tour::{Motion, randomised};
 use crate::noise::noise_file::NoiseFile;
 use crate::quantity::Sensor;
 use mimu_allan::model::FLOOR;
@@ -161,8 +161,6 @@ pub struct Spending {
     pub dwell_s: f64,
     /// Time of all moves, s.
     pub moves_s: f64,
-    /// The same if each pass took the shortest way found, s.
-    pub shortest_moves_s: f64,
     /// Sigma of one dwell mean, SI unit.
     pub sigma: f64,
     /// Normalised mean sigma of the parameters over all passes; see
@@ -207,13 +205,12 @@ pub struct Session {
     pub noise: DwellNoise,
     /// Moves between the dwells.
     pub motion: Motion,
-    /// Order of the dwells within a pass.
-    pub order: Order,
 }
 
 impl Session {
     /// The number of dwells in a pass, the number of passes and the length of a dwell that make the parameters' mean sigma
-    /// smallest. `seed` is that of the searches and of the randomised orders, which differ between passes.
+    /// smallest. `seed` is that of the searches and of the randomised orders, which differ between passes: on the same way
+    /// back, two dwells in a row at the same setting would share the drift.
     pub fn spend(&self, problem: &Problem, seed: u64) -> Result<Budget> {
         let least = problem.fewest();
         let sizes: Vec<usize> = (least..=MOST.max(least)).collect();
@@ -224,8 +221,7 @@ impl Session {
                 let dwell_s = (self.time_s / n as f64).min(self.noise.longest_s());
                 let sigma = self.noise.sigma(dwell_s.max(SHORTEST_S));
                 let settings = problem.at_sigma(sigma).best(n, seed)?;
-                let shortest = self.motion.shortest(&settings);
-                let ways = (1..=PASSES).filter_map(|k| self.passes(problem, &shortest, k, seed));
+                let ways = (1..=PASSES).filter_map(|k| self.passes(problem, &settings, k, seed));
                 Ok(ways.min_by(|a, b| a.mean_sigma.total_cmp(&b.mean_sigma)))
             })
             .collect::<Result<_>>()?;
@@ -247,19 +243,13 @@ impl Session {
     fn passes(
         &self,
         problem: &Problem,
-        shortest: &[Setting],
+        pass: &[Setting],
         passes: usize,
         seed: u64,
     ) -> Option<Spending> {
-        // All passes go the same way: on a way back, two dwells in a row at the same setting would share the drift.
-        let there = shortest.repeat(passes);
-        let shortest_moves_s = self.motion.moves_s(&there);
-        let settings = match self.order {
-            Order::Shortest => there,
-            Order::Randomised => (0..passes as u64)
-                .flat_map(|pass| randomised(shortest, seed.wrapping_add(pass)))
-                .collect(),
-        };
+        let settings: Vec<Setting> = (0..passes as u64)
+            .flat_map(|k| randomised(pass, seed.wrapping_add(k)))
+            .collect();
         let moves_s = self.motion.moves_s(&settings);
         let most_s = (self.time_s - moves_s) / settings.len() as f64;
         let dwell_s = most_s.min(self.noise.longest_s().max(SHORTEST_S));
@@ -273,9 +263,8 @@ impl Session {
             passes,
             dwell_s,
             moves_s,
-            shortest_moves_s,
             sigma,
-            mean_sigma: problem.mean_sigma(shortest, mean),
+            mean_sigma: problem.mean_sigma(pass, mean),
             settings,
         })
     }

@@ -14,7 +14,7 @@ use super::information::{Inverse, Rows, dot};
 pub struct Found {
     /// Index of the candidate of each dwell, ascending; a candidate may occur more than once.
     pub points: Vec<usize>,
-    /// Logarithm of `det F'F`, over all blocks.
+    /// Logarithm of `det F'F`.
     pub log_det: f64,
 }
 
@@ -30,7 +30,7 @@ const DRAWS: usize = 8;
 /// `starts` random starts, determinate for a `seed`. Empty if no `n` of the candidates determine the
 /// parameters, beside what the rows have as given.
 pub fn search(rows: &Rows, n: usize, starts: usize, seed: u64) -> Vec<Found> {
-    let too_few = !rows.has_given() && rows.widths().iter().any(|p| n < *p);
+    let too_few = !rows.has_given() && n < rows.width();
     if rows.is_empty() || too_few {
         return Vec::new();
     }
@@ -49,19 +49,12 @@ fn random_start(rows: &Rows, n: usize, random: &mut SplitMix) -> Option<Vec<usiz
     let mut inverse = Inverse::ridge(rows)?;
     let mut points = Vec::with_capacity(n);
     for _ in 0..n {
-        let gain = |&i: &usize| -> f64 {
-            let blocks = 0..rows.widths().len();
-            blocks
-                .map(|b| inverse.product(b, rows.row(b, i), rows.row(b, i)).ln_1p())
-                .sum()
-        };
+        let gain = |&i: &usize| inverse.variance(rows.row(i));
         let drawn = std::iter::repeat_with(|| random.below(rows.len())).take(DRAWS);
         let Some(best) = drawn.max_by(|a, b| gain(a).total_cmp(&gain(b))) else {
             break;
         };
-        for b in 0..rows.widths().len() {
-            inverse.update(b, rows.row(b, best), 1.0);
-        }
+        inverse.update(rows.row(best), 1.0);
         points.push(best);
     }
     Some(points)
@@ -69,46 +62,35 @@ fn random_start(rows: &Rows, n: usize, random: &mut SplitMix) -> Option<Vec<usiz
 
 /// Exchanges until none helps. `None` if the start is singular.
 fn improve(rows: &Rows, mut points: Vec<usize>) -> Option<Found> {
-    let blocks = rows.widths().len();
-    let inverse = |points: &[usize]| Inverse::of(rows, points.iter().map(|&i| (i, 1.0)));
+    let inverse = |points: &[usize]| Inverse::of(rows, points.iter().copied());
     for _ in 0..PASSES {
         // Computed again in each pass, because updates accumulate rounding.
         let mut inverse = inverse(&points)?;
-        let mut variances: Vec<Vec<f64>> = (0..blocks)
-            .map(|b| {
-                let each = 0..rows.len();
-                each.map(|j| inverse.product(b, rows.row(b, j), rows.row(b, j)))
-                    .collect()
-            })
-            .collect();
+        let each = 0..rows.len();
+        let mut variances: Vec<f64> = each.map(|j| inverse.variance(rows.row(j))).collect();
         let mut exchanged = false;
-        for k in 0..points.len() {
-            let out = points[k];
-            let mut gains = vec![1.0; rows.len()];
-            for b in 0..blocks {
-                let v = inverse.times(b, rows.row(b, out));
-                let (d, keep) = (&variances[b], 1.0 - variances[b][out]);
-                for (j, gain) in gains.iter_mut().enumerate() {
-                    let cross = dot(&v, rows.row(b, j));
-                    *gain *= (1.0 + d[j]) * keep + cross * cross;
-                }
-            }
-            let best = gains.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1));
-            let Some((into, _)) = best.filter(|(_, gain)| **gain > 1.0 + GAIN) else {
+        for out in &mut points {
+            let v = inverse.times(rows.row(*out));
+            let keep = 1.0 - variances[*out];
+            let gain = |(j, d): (usize, &f64)| {
+                let cross = dot(&v, rows.row(j));
+                (1.0 + d) * keep + cross * cross
+            };
+            let gains = variances.iter().enumerate().map(gain).enumerate();
+            let best = gains.max_by(|a, b| a.1.total_cmp(&b.1));
+            let Some((into, _)) = best.filter(|(_, gain)| *gain > 1.0 + GAIN) else {
                 continue;
             };
-            for b in 0..blocks {
-                for (i, weight) in [(into, 1.0), (out, -1.0)] {
-                    let v = inverse.times(b, rows.row(b, i));
-                    let factor = weight / (1.0 + weight * dot(&v, rows.row(b, i)));
-                    for (j, d) in variances[b].iter_mut().enumerate() {
-                        let cross = dot(&v, rows.row(b, j));
-                        *d -= factor * cross * cross;
-                    }
-                    inverse.update(b, rows.row(b, i), weight);
+            for (i, weight) in [(into, 1.0), (*out, -1.0)] {
+                let v = inverse.times(rows.row(i));
+                let factor = weight / (1.0 + weight * dot(&v, rows.row(i)));
+                for (j, d) in variances.iter_mut().enumerate() {
+                    let cross = dot(&v, rows.row(j));
+                    *d -= factor * cross * cross;
                 }
+                inverse.update(rows.row(i), weight);
             }
-            points[k] = into;
+            *out = into;
             exchanged = true;
         }
         if !exchanged {

@@ -1,8 +1,7 @@
 //! What a set of settings determines, and how well.
 
 use super::aim;
-use super::information::{Inverse, Rows};
-use super::lack_of_fit::{Notice, notices};
+use super::information::Inverse;
 use super::model::{Parameter, Setting};
 use super::problem::Problem;
 use super::refinement::Region as _;
@@ -29,8 +28,7 @@ pub const WEAK: f64 = 10.0;
 pub struct Judgement {
     /// The settings, one a dwell, in the order given.
     pub settings: Vec<Setting>,
-    /// `det(F'F/n)`, fang (22), of one sensor where all three have the same regressors, else the product over
-    /// them. Not a number beside a population, whose part does not grow with n.
+    /// `det(F'F/n)`, fang (22), of one sensor where all three have the same regressors. Not a number beside a population, whose part does not grow with n.
     pub determinant: f64,
     /// D-efficiency against the continuous optimum over the reach: 1 is the best possible, 0 is singular. Not a number beside a population: the
     /// optimum then depends on the number of dwells and their noise.
@@ -51,8 +49,6 @@ pub struct Judgement {
     /// Residual degrees of freedom of a regression from repeated inputs: these show the noise, whatever the
     /// model.
     pub repetition_dof: usize,
-    /// How well it would notice the terms that the model lacks.
-    pub notices: Vec<Notice>,
 }
 
 impl Problem {
@@ -62,7 +58,7 @@ impl Problem {
     }
 
     fn mean_sigma_by(&self, log_det: f64, sigma: f64) -> f64 {
-        sigma * (-log_det / (2.0 * self.optimum.parameters as f64)).exp()
+        sigma * (-log_det / (2.0 * self.reach.model.width() as f64)).exp()
     }
 
     /// Puts the medians over a person's poses in place of the sigmas of `parameters`, which are those of a single regression.
@@ -71,9 +67,10 @@ impl Problem {
         let mut found = vec![Vec::new(); parameters.len()];
         for poses in aim::taken(settings, self.aim()) {
             let rows = self.reach.rows(&poses).beside(given.clone());
-            let inverse = Inverse::of(&rows, (0..rows.len()).map(|i| (i, 1.0)));
+            let inverse = Inverse::of_all(&rows);
+            let width = rows.width();
             for (k, found) in found.iter_mut().enumerate() {
-                let variance = inverse.as_ref().map(|i| i.block(0)[(k, k)]);
+                let variance = inverse.as_ref().map(|i| i.matrix()[(k % width, k % width)]);
                 found.push(sigma * variance.map_or(f64::INFINITY, f64::sqrt));
             }
         }
@@ -89,54 +86,44 @@ impl Problem {
     ///
     /// They need not be within reach; the efficiency is against the optimum within reach. Without settings, the population alone is judged.
     pub fn judge(&self, settings: &[Setting], sigma: f64) -> Judgement {
-        let model = &self.reach.model;
         let n = settings.len();
         let given = self.given(sigma);
-        let log_det = self.log_det_of(settings, given.clone());
-        let p = self.optimum.parameters;
-        let mut parameters = Vec::new();
-        let mut condition = 0.0_f64;
+        let rows = self.reach.rows(settings).beside(given.clone());
+        let (f, width) = (rows.matrix(), rows.width());
+        let observability = Observability::of(&f);
+        let inverse = Inverse::of_all(&rows);
+        let log_det = inverse.as_ref().map_or(f64::NEG_INFINITY, Inverse::log_det);
         let distinct = self.distinct(settings).len();
-        let mut width = 0;
-        for regression in 0..model.regressions() {
-            let list = model.parameters(regression);
-            width = list.len();
-            let mut rows = Rows::new(&[width]).beside(given.clone());
-            let mut row = Vec::new();
-            for s in settings {
-                row.clear();
-                model.regressors(regression, s, &mut row);
-                rows.push(&row);
+        let list = self.reach.model.parameters().into_iter().enumerate();
+        let determined = list.map(|(place, parameter)| {
+            // The sensors of a triad have the same regressors.
+            let k = place % width;
+            let alone = f.column(k).norm();
+            let unseen = observability.undetermined.iter().any(|(u, _)| *u == k);
+            let variance = match &inverse {
+                Some(inverse) => inverse.matrix()[(k, k)],
+                // Some parameters of a singular design are determined all the same.
+                None if unseen || alone == 0.0 => f64::INFINITY,
+                None => pseudo_variance(&f, k),
+            };
+            Determined {
+                parameter,
+                sigma: sigma * variance.sqrt(),
+                inflation: variance.sqrt() * alone,
             }
-            let f = rows.matrix(0);
-            let observability = Observability::of(&f);
-            condition = condition.max(observability.condition);
-            let inverse = Inverse::of(&rows, (0..n).map(|i| (i, 1.0)));
-            for (k, parameter) in list.into_iter().enumerate() {
-                let alone = f.column(k).norm();
-                let unseen = observability.undetermined.iter().any(|(u, _)| *u == k);
-                let variance = match &inverse {
-                    Some(inverse) => inverse.block(0)[(k, k)],
-                    // Some parameters of a singular design are determined all the same.
-                    None if unseen || alone == 0.0 => f64::INFINITY,
-                    None => pseudo_variance(&f, k),
-                };
-                parameters.push(Determined {
-                    parameter,
-                    sigma: sigma * variance.sqrt(),
-                    inflation: variance.sqrt() * alone,
-                });
-            }
-        }
+        });
+        let mut parameters: Vec<Determined> = determined.collect();
         if self.aim() > 0.0 && n > 0 {
             self.as_taken(settings, sigma, &mut parameters);
         }
+        // Of a dwell, on average.
+        let mean = log_det - width as f64 * (n as f64).ln();
         let (determinant, d_efficiency) = match &given {
             Some(_) => (f64::NAN, f64::NAN),
-            None => (
-                (log_det - p as f64 * (n as f64).ln()).exp(),
-                self.optimum.efficiency(log_det, n),
-            ),
+            None => {
+                let over = (mean - self.reach.optimum()) / width as f64;
+                (mean.exp(), over.exp())
+            }
         };
         Judgement {
             settings: settings.to_vec(),
@@ -145,11 +132,10 @@ impl Problem {
             sigma,
             parameters,
             mean_sigma: self.mean_sigma_by(log_det, sigma),
-            condition,
+            condition: observability.condition,
             lack_of_fit_dof: (distinct + given.as_ref().map_or(0, |g| g.nrows()))
                 .saturating_sub(width),
             repetition_dof: n - distinct,
-            notices: notices(model, settings, given.as_ref()),
         }
     }
 }

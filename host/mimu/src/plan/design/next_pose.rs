@@ -17,7 +17,7 @@ impl<'a> Had<'a> {
     /// These dwells, for a model and a fixture.
     pub fn new(reach: &'a Reach, dwells: &[Setting]) -> Self {
         let rows = reach.rows(dwells);
-        let inverse = Inverse::of(&rows, (0..rows.len()).map(|i| (i, 1.0)));
+        let inverse = Inverse::of_all(&rows);
         Self {
             reach,
             rows,
@@ -38,14 +38,14 @@ impl<'a> Had<'a> {
         }
         let mut rows = self.rows.clone();
         rows.push(&row);
-        Inverse::of(&rows, (0..rows.len()).map(|i| (i, 1.0))).map(|i| i.log_det())
+        Inverse::of_all(&rows).map(|i| i.log_det())
     }
 
     /// Share by which one more dwell would lower the geometric mean of the parameters' sigmas; `None` if the dwells do not determine all parameters.
     pub fn gain(&self, one_more: &Setting) -> Option<f64> {
         // A sigma is a 2p-th root of the inverse determinant, which the dwell multiplies by 1 + f' M⁻¹ f.
         let factor = 1.0 + self.inverse.as_ref()?.variance(&self.row(one_more));
-        Some(1.0 - factor.powf(-0.5 / self.rows.parameters() as f64))
+        Some(1.0 - factor.powf(-0.5 / self.rows.width() as f64))
     }
 
     fn row(&self, setting: &Setting) -> Vec<f64> {
@@ -57,7 +57,7 @@ impl<'a> Had<'a> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::model::{Model, Terms};
+    use super::super::model::Model;
     use super::super::reach::{Fixture, Rates};
     use super::*;
     use mimu_recording::Reference;
@@ -65,7 +65,7 @@ mod tests {
 
     fn reach() -> Reach {
         Reach {
-            model: Model::accel(Reference::Gravity, &Terms::default()),
+            model: Model::accel(Reference::Gravity),
             fixture: Fixture::Hand,
             rates: Rates::Any,
         }

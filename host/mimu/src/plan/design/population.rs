@@ -7,7 +7,7 @@
 
 use nalgebra::{DMatrix, SVector};
 
-use super::model::{Model, Terms};
+use super::model::Model;
 use crate::observation::{LOWER, free, of_output};
 use crate::parameter::ParameterKind;
 use crate::prior::Prior;
@@ -62,8 +62,8 @@ impl Population {
                 "make it of calibrations by hand: mimu fleet DIR --prior FILE",
             );
         };
-        let model = Model::accel(Reference::Gravity, &Terms::default());
-        let si: Vec<f64> = model.parameters(0).iter().map(|p| p.si).collect();
+        let model = Model::accel(Reference::Gravity);
+        let si: Vec<f64> = model.parameters().iter().map(|p| p.si).collect();
         let lower: Vec<SVector<f64, 9>> = by
             .row_iter()
             .map(|row| {

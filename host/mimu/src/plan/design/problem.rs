@@ -3,27 +3,22 @@
 use nalgebra::{DMatrix, Vector3};
 use rayon::prelude::*;
 
-use super::continuous::{Optimum, TOLERANCE};
+use super::exchange;
 use super::information::{Inverse, Rows};
 use super::model::{Model, Setting};
 use super::population::Population;
 use super::reach::{Fixture, Rates, Reach};
 use super::refinement::{Region as _, refine};
-use super::{continuous, exchange, lack_of_fit};
-use crate::estimate::least_squares::Observability;
 use crate::estimate::magnitude::FEWEST_WITH_PRIOR;
-use crate::quantity::Sensor;
-use crate::quantity::plural;
+use crate::quantity::{Sensor, plural};
 use mimu_recording::Reference;
 use mimu_recording::error::{Argument, Error, Result};
 
-/// A model, what it can be measured with, and the optimum that designs are judged by.
+/// A model, and what it can be measured with.
 #[derive(Debug, Clone)]
 pub struct Problem {
     /// Model and reach.
     pub reach: Reach,
-    /// Continuous optimum over the reach.
-    pub optimum: Optimum<Setting>,
     candidates: Vec<Setting>,
     rows: Rows,
     population: Option<Beside>,
@@ -39,7 +34,7 @@ struct Beside {
     sigma: f64,
 }
 
-/// Random starts of a search. In 17 problems (5 to 40 dwells; affine, cubic, magnitude of gravity) 200 found
+/// Random starts of a search. In 17 problems (5 to 40 dwells; known input, magnitude of gravity) 200 found
 /// nothing that 10 had not found.
 const STARTS: usize = 20;
 /// Best designs of a search that are refined between the candidates.
@@ -53,58 +48,54 @@ const DIFFERENT: f64 = 0.01;
 
 impl Problem {
     /// An accelerometer on `fixture`.
-    pub fn accel(model: Model, fixture: Fixture) -> Result<Self> {
-        Self::new(Reach {
-            model,
+    ///
+    /// # Errors
+    /// The magnitude of gravity on six faces.
+    pub fn accel(reference: Reference, fixture: Fixture) -> Result<Self> {
+        if reference != Reference::Table && fixture == Fixture::Faces {
+            return Err(Error::undetermined(
+                Sensor::Accel,
+                "on six faces the magnitude of gravity cannot distinguish C_yx, C_zx, C_zy",
+                "use another table or reference",
+            )
+            .about(Argument::Table));
+        }
+        Ok(Self::new(Reach {
+            model: Model::accel(reference),
             fixture,
             rates: Rates::Any,
-        })
+        }))
     }
 
-    /// A gyro triad on `fixture`, turned at `rates`.
-    pub fn gyro(model: Model, fixture: Fixture, rates: Rates) -> Result<Self> {
-        let holds = match fixture {
-            Fixture::ThreeAxis | Fixture::Faces => None,
-            Fixture::TwoAxis => Some("a two-axis table holds a rate about one body axis only"),
-            Fixture::Hand => Some("by hand no rate is known, only turns between dwells"),
+    /// A gyro triad on `fixture`, turned at `rates` up to `span`, rad/s about each axis.
+    ///
+    /// # Errors
+    /// A fixture that holds no rates.
+    pub fn gyro(span: Vector3<f64>, fixture: Fixture, rates: Rates) -> Result<Self> {
+        let problem = match fixture {
+            Fixture::ThreeAxis | Fixture::Faces => {
+                return Ok(Self::new(Reach {
+                    model: Model::gyro(span),
+                    fixture,
+                    rates,
+                }));
+            }
+            Fixture::TwoAxis => "a two-axis table holds a rate about one body axis only",
+            Fixture::Hand => "by hand no rate is known, only turns between dwells",
         };
-        match holds {
-            None => Self::new(Reach {
-                model,
-                fixture,
-                rates,
-            }),
-            Some(problem) => Err(Error::new(
-                format!("gyro, {}", fixture.name()),
-                problem,
-                "design for a three-axis table, or for one that shows the faces",
-            )
-            .about(Argument::Table)),
-        }
+        let place = format!("gyro, {}", fixture.name());
+        let remedy = "design for a three-axis table, or for one that shows the faces";
+        Err(Error::new(place, problem, remedy).about(Argument::Table))
     }
 
-    fn new(reach: Reach) -> Result<Self> {
-        if reach.model.feels_force() && reach.model.sensor == Sensor::Accel {
-            return Err(Error::new(
-                "accel",
-                "g-sensitivity is an error of gyros",
-                "leave the term out, or design for the gyro",
-            )
-            .about(Argument::Sensor));
-        }
+    fn new(reach: Reach) -> Self {
         let candidates = reach.candidates();
-        let rows = reach.rows(&candidates);
-        let optimum = continuous::optimum(&reach, &candidates).filter(|o| o.excess <= TOLERANCE);
-        match optimum {
-            Some(optimum) => Ok(Self {
-                reach,
-                optimum,
-                candidates,
-                rows,
-                population: None,
-                aim: 0.0,
-            }),
-            None => Err(undetermined(&reach, &rows)),
+        Self {
+            rows: reach.rows(&candidates),
+            reach,
+            candidates,
+            population: None,
+            aim: 0.0,
         }
     }
 
@@ -112,17 +103,16 @@ impl Problem {
     /// takes poses with the standard deviation `aim`, rad, about each level axis.
     ///
     /// # Errors
-    /// The model or the fixture is none that a fit with a prior has: poses by hand, the affine model, the magnitude of gravity.
+    /// The sensor, the reference or the fixture is none that a fit with a prior has: poses by hand, the magnitude of gravity.
     pub fn beside(self, population: Population, sigma: f64, aim: f64) -> Result<Self> {
         let model = &self.reach.model;
         let fits = model.sensor == Sensor::Accel
             && model.reference == Reference::Gravity
-            && model.terms.is_empty()
             && self.reach.fixture == Fixture::Hand;
         if !fits {
             return Err(Error::new(
-                format!("{}, {model}, {}", model.sensor, self.reach.fixture.name()),
-                "a prior is for the affine model of an accelerometer by hand, with gravity as the reference",
+                format!("{}, {}", model.sensor, self.reach.fixture.name()),
+                "a prior is for an accelerometer by hand, with gravity as the reference",
                 "leave the prior out",
             ));
         }
@@ -176,15 +166,15 @@ impl Problem {
     pub fn fewest(&self) -> usize {
         match self.population {
             Some(_) => FEWEST_WITH_PRIOR,
-            None => self.rows.widths().iter().max().copied().unwrap_or(0),
+            None => self.rows.width(),
         }
     }
 
     /// Best design found of `n` dwells, in no particular order; determinate for a `seed`.
     ///
     /// By hand only faces, edges and corners are used: nobody holds (-0.859, 0.346, 0.377), and twelve of these 26 directions have a D-efficiency of
-    /// 0.97. Of equally good designs, one on different faces is taken, which people and fixtures can hold; else the
-    /// one that would notice most of the terms that the model lacks ([`lack_of_fit::potential`]).
+    /// 0.97. Of equally good designs, the one with most different inputs is taken, because only these reveal a wrong model; of those, one on faces, edges and
+    /// corners.
     pub fn best(&self, n: usize, seed: u64) -> Result<Vec<Setting>> {
         if n < self.fewest() {
             return Err(self.too_few(n));
@@ -223,13 +213,7 @@ impl Problem {
         let all = [on_faces, on_plain, refined_plain, refined_grid].concat();
         let values: Vec<f64> = all.iter().map(|d| self.log_det(d)).collect();
         let most = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        let worth = |settings: &[Setting]| {
-            let held = settings.iter().all(|s| Fixture::Faces.reaches(&s.up));
-            match held && self.distinct(settings).len() == n {
-                true => f64::INFINITY,
-                false => lack_of_fit::potential(&self.reach.model, settings, given.as_ref()),
-            }
-        };
+        let worth = |settings: &[Setting]| self.distinct(settings).len();
         let equal = all
             .into_iter()
             .zip(values)
@@ -242,7 +226,7 @@ impl Problem {
     }
 
     fn too_few(&self, n: usize) -> Error {
-        let p = self.rows.widths().iter().max().copied().unwrap_or(0);
+        let p = self.rows.width();
         let beside = match self.population {
             Some(_) => " beside a prior",
             None => "",
@@ -252,11 +236,7 @@ impl Problem {
             plural(n as u64, "dwell")
         );
         let remedy = format!("design at least {}", self.fewest().max(n + 1).min(p));
-        Error::new(
-            format!("{}, {}", self.reach.model.sensor, self.reach.model),
-            problem,
-            remedy,
-        )
+        Error::new(self.reach.model.sensor, problem, remedy)
     }
 
     /// Logarithm of `det F'F` of one dwell at each of the settings, the population included; minus infinity if singular.
@@ -266,8 +246,7 @@ impl Problem {
 
     pub(super) fn log_det_of(&self, settings: &[Setting], given: Option<DMatrix<f64>>) -> f64 {
         let rows = self.reach.rows(settings).beside(given);
-        let inverse = Inverse::of(&rows, (0..rows.len()).map(|i| (i, 1.0)));
-        inverse.map_or(f64::NEG_INFINITY, |i| i.log_det())
+        Inverse::of_all(&rows).map_or(f64::NEG_INFINITY, |i| i.log_det())
     }
 
     /// The settings without repetitions of the same input to the model.
@@ -284,44 +263,6 @@ impl Problem {
     /// Whether two settings are the same input to the model.
     fn same(&self, a: &Setting, b: &Setting) -> bool {
         let model = &self.reach.model;
-        let close = |a: Vector3<f64>, b: Vector3<f64>| (a - b).norm() < DIFFERENT;
-        close(model.input(a), model.input(b)) && (!model.feels_force() || close(a.up, b.up))
+        (model.input(a) - model.input(b)).norm() < DIFFERENT
     }
-}
-
-/// The error if no settings within reach distinguish some parameters.
-fn undetermined(reach: &Reach, rows: &Rows) -> Error {
-    let mut names = Vec::new();
-    for block in 0..rows.widths().len() {
-        let found = Observability::of(&rows.matrix(block));
-        let parameters = reach.model.parameters(block);
-        names.extend(
-            found
-                .undetermined
-                .iter()
-                .map(|(k, _)| parameters[*k].name.clone()),
-        );
-    }
-    let place = format!("{}, {}", reach.model.sensor, reach.model);
-    if names.is_empty() {
-        let problem = "the continuous optimum was not reached";
-        return Error::new(
-            place,
-            problem,
-            "leave out terms that are hard to distinguish",
-        );
-    }
-    let of = match reach.model.reference {
-        Reference::Table => "known inputs",
-        Reference::Gravity | Reference::TurntableRate => "the magnitude of gravity",
-    };
-    Error::undetermined(
-        place,
-        format!(
-            "{of} on the table {} cannot distinguish {}",
-            reach.fixture.name(),
-            names.join(", ")
-        ),
-        "leave out the term, or use another table or reference",
-    )
 }

@@ -1,17 +1,16 @@
-//! From candidates to a continuous region: designs and maxima of the variance function between the grid's
-//! points.
+//! From candidates to a continuous region: designs between the grid's points.
 
-use super::information::{Inverse, Rows};
+use super::information::{Inverse, Rows, dot};
 
 /// Where one can measure, and the regressor row there.
 pub trait Region: Sync {
     /// A point of it.
     type Point: Clone + Send + Sync;
 
-    /// Number of parameters of each block of a row.
-    fn widths(&self) -> Vec<usize>;
+    /// Number of parameters.
+    fn width(&self) -> usize;
 
-    /// Appends the row of `point`, its blocks one after the other.
+    /// Appends the row of `point`.
     fn regressors(&self, point: &Self::Point, row: &mut Vec<f64>);
 
     /// Points of the region about `step` away from `point` (full extent 1, or 1 rad), along all directions
@@ -20,7 +19,7 @@ pub trait Region: Sync {
 
     /// Rows of `points`.
     fn rows(&self, points: &[Self::Point]) -> Rows {
-        let mut rows = Rows::new(&self.widths());
+        let mut rows = Rows::new(self.width());
         let mut row = Vec::new();
         for point in points {
             row.clear();
@@ -47,7 +46,7 @@ const SWEEPS: usize = 400;
 /// is better.
 ///
 /// Derivatives would be faster, but would need every term twice; at these sizes the search takes microseconds.
-pub(super) fn climb<R: Region>(
+fn climb<R: Region>(
     region: &R,
     point: &R::Point,
     first: f64,
@@ -87,36 +86,24 @@ pub(super) fn climb<R: Region>(
 /// Returns the points and the logarithm of `det F'F`; `None` if the design does not determine the parameters.
 pub fn refine<R: Region>(region: &R, mut points: Vec<R::Point>) -> Option<(Vec<R::Point>, f64)> {
     let mut rows = region.rows(&points);
-    let all = |rows: &Rows| Inverse::of(rows, (0..rows.len()).map(|i| (i, 1.0)));
-    let mut inverse = all(&rows)?;
+    let mut inverse = Inverse::of_all(&rows)?;
     let mut first = STEPS[0];
     for _ in 0..SWEEPS {
         let before = inverse.log_det();
         for k in 0..points.len() {
             // log of the factor by which the determinant grows when row f is exchanged for row g; see
             // `exchange`.
-            let own: Vec<(Vec<f64>, f64)> = (0..rows.widths().len())
-                .map(|b| {
-                    let f = rows.row(b, k);
-                    (inverse.times(b, f), 1.0 - inverse.product(b, f, f))
-                })
-                .collect();
-            let gain = |row: &[f64]| {
-                let mut from = 0;
-                let mut gain = 0.0;
-                for (b, (v, keep)) in own.iter().enumerate() {
-                    let g = &row[from..from + v.len()];
-                    from += v.len();
-                    let cross = super::information::dot(v, g);
-                    gain += ((1.0 + inverse.product(b, g, g)) * keep + cross * cross).ln();
-                }
-                gain
+            let f = rows.row(k);
+            let (v, keep) = (inverse.times(f), 1.0 - inverse.variance(f));
+            let gain = |g: &[f64]| {
+                let cross = dot(&v, g);
+                ((1.0 + inverse.variance(g)) * keep + cross * cross).ln()
             };
             let (moved, gained) = climb(region, &points[k], first, gain);
             if gained > GAIN {
                 points[k] = moved;
                 rows = region.rows(&points);
-                inverse = all(&rows)?;
+                inverse = Inverse::of_all(&rows)?;
             }
         }
         if inverse.log_det() - before < 10.0 * GAIN {

@@ -4,28 +4,11 @@ use super::exchange::SplitMix;
 use super::model::Setting;
 use super::reach::Fixture;
 
-/// Order of the dwells of a design.
+/// Order of the dwells of a design, in results.
 ///
-/// Biases wander, and neighbouring dwells share most of this error. If their inputs are similar, the error goes into the
-/// parameters that depend on the difference between such groups, and no residual shows it. In a randomised order it is
-/// scatter like any other.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Order {
-    /// The one with the shortest moves found, in which similar settings are neighbours.
-    Shortest,
-    /// Randomised.
-    Randomised,
-}
-
-impl Order {
-    /// Name as on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Shortest => "shortest",
-            Self::Randomised => "randomised",
-        }
-    }
-}
+/// Biases wander, and neighbouring dwells share most of this error. If their inputs are similar, as in an order with short moves, the error goes into the
+/// parameters that depend on the difference between such groups, and no residual shows it. In a randomised order it is scatter like any other.
+pub const RANDOMISED: &str = "randomised";
 
 /// The settings in a randomised order (Fisher and Yates), determinate for a `seed`.
 pub fn randomised(settings: &[Setting], seed: u64) -> Vec<Setting> {
@@ -82,63 +65,5 @@ impl Motion {
                 .windows(2)
                 .map(|w| self.between(&w[0], &w[1]))
                 .sum::<f64>()
-    }
-
-    /// The settings in an order with short moves: nearest neighbours from every start, then 2-opt (Croes,
-    /// 1958).
-    pub fn shortest(&self, settings: &[Setting]) -> Vec<Setting> {
-        let each =
-            (0..settings.len()).map(|start| self.two_opt(self.nearest_neighbours(settings, start)));
-        let shorter = |a: Vec<Setting>, b: Vec<Setting>| {
-            if self.moves_s(&b) < self.moves_s(&a) - 1e-9 {
-                b
-            } else {
-                a
-            }
-        };
-        each.reduce(shorter).unwrap_or_default()
-    }
-
-    fn nearest_neighbours(&self, settings: &[Setting], start: usize) -> Vec<Setting> {
-        let mut left = settings.to_vec();
-        let mut tour = vec![left.remove(start)];
-        while let Some(last) = tour.last()
-            && !left.is_empty()
-        {
-            let time = |s: &Setting| self.between(last, s);
-            let near = (0..left.len()).min_by(|a, b| time(&left[*a]).total_cmp(&time(&left[*b])));
-            let next = left.remove(near.unwrap_or(0));
-            tour.push(next);
-        }
-        tour
-    }
-
-    /// Reverses segments of the sequence while that shortens it. Times are the same both ways.
-    fn two_opt(&self, mut tour: Vec<Setting>) -> Vec<Setting> {
-        let n = tour.len();
-        loop {
-            let mut shortened = false;
-            for i in 0..n {
-                for j in i + 1..n {
-                    // The ends are free: a segment at one of them has one edge to exchange.
-                    let time = |a: Option<&Setting>, b: Option<&Setting>| match (a, b) {
-                        (Some(a), Some(b)) => self.between(a, b),
-                        (None, Some(s)) => s.rate.abs() / self.acceleration,
-                        _ => 0.0,
-                    };
-                    let before = i.checked_sub(1).and_then(|k| tour.get(k));
-                    let after = tour.get(j + 1);
-                    let (first, last) = (tour.get(i), tour.get(j));
-                    let now = time(before, first) + time(last, after);
-                    if time(before, last) + time(first, after) < now - 1e-9 {
-                        tour[i..=j].reverse();
-                        shortened = true;
-                    }
-                }
-            }
-            if !shortened {
-                return tour;
-            }
-        }
     }
 }

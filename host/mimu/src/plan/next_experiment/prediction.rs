@@ -10,7 +10,6 @@ use crate::effects::effect::{Effect, NonlinearParameter};
 use crate::effects::quantity::{Conditions, Reading};
 use crate::observation::{ByTriad, LOWER, slope};
 use crate::plan::design::information::{Inverse, Rows};
-use crate::plan::design::lack_of_fit::{ALIASED, extend, outside};
 use crate::quantity::Sensor;
 use crate::readable::STANDARD_GRAVITY;
 use mimu_recording::Reference;
@@ -342,14 +341,14 @@ impl Columns {
             if seen.is_empty() {
                 continue;
             }
-            let mut rows = Rows::new(&[seen.len()]);
+            let mut rows = Rows::new(seen.len());
             let n = columns[0].len();
             for i in 0..n {
                 rows.push(&seen.iter().map(|(_, c)| c[i]).collect::<Vec<f64>>());
             }
-            if let Some(inverse) = Inverse::of(&rows, (0..n).map(|i| (i, 1.0))) {
+            if let Some(inverse) = Inverse::of_all(&rows) {
                 for (at, (k, _)) in seen.iter().enumerate() {
-                    information[*k] += 1.0 / inverse.block(0)[(at, at)];
+                    information[*k] += 1.0 / inverse.matrix()[(at, at)];
                 }
             }
         }
@@ -357,5 +356,27 @@ impl Columns {
             .into_iter()
             .map(|i: f64| i.sqrt().recip())
             .collect()
+    }
+}
+
+/// Share of a column (squared) outside of others below which it is one of their sums.
+const ALIASED: f64 = 1e-9;
+
+/// Part of `column` outside an orthonormal basis. Projected twice: the first projection leaves rounding.
+fn outside(basis: &[DVector<f64>], mut column: DVector<f64>) -> DVector<f64> {
+    for _ in 0..2 {
+        for unit in basis {
+            column -= unit * unit.dot(&column);
+        }
+    }
+    column
+}
+
+/// Adds the direction of `column` to an orthonormal basis, if it is a new one.
+fn extend(basis: &mut Vec<DVector<f64>>, column: DVector<f64>) {
+    let size = column.norm_squared();
+    let rest = outside(basis, column);
+    if rest.norm_squared() > ALIASED * size {
+        basis.push(rest.normalize());
     }
 }

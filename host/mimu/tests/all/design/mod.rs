@@ -4,33 +4,26 @@ mod brute_force;
 mod next_experiment;
 mod polynomials;
 mod population;
+#[allow(dead_code)] // the tables of the papers use the rest
+#[path = "../../../../../tests/papers/published.rs"]
+mod published;
 mod schemes;
 mod sphere;
 mod time;
 
 use mimu::plan::design::Problem;
-use mimu::plan::design::model::{Model, Terms};
 use mimu::plan::design::reach::{Fixture, RateList};
 use mimu_recording::Reference;
 use nalgebra::Vector3;
 
-fn terms(list: &str) -> Terms {
-    list.parse().unwrap()
+fn accel(reference: Reference) -> Problem {
+    Problem::accel(reference, Fixture::ThreeAxis).unwrap()
 }
 
-fn accel(reference: Reference, list: &str) -> Problem {
-    Problem::accel(Model::accel(reference, &terms(list)), Fixture::ThreeAxis).unwrap()
-}
-
-fn gyro(list: &str, rates: &str) -> Problem {
+fn gyro(rates: &str) -> Problem {
     let rates: RateList = rates.parse().unwrap();
     let span = Vector3::repeat(rates.largest_dps.to_radians());
-    Problem::gyro(
-        Model::gyro(&terms(list), span),
-        Fixture::ThreeAxis,
-        rates.rates,
-    )
-    .unwrap()
+    Problem::gyro(span, Fixture::ThreeAxis, rates.rates).unwrap()
 }
 
 /// Whether two figures agree to a relative difference.

@@ -1,6 +1,5 @@
 //! Polynomials on the interval and the square: optima that have been known for half a century.
 
-use mimu::plan::design::continuous::optimum;
 use mimu::plan::design::exchange;
 use mimu::plan::design::information::Rows;
 use mimu::plan::design::refinement::{Region, refine};
@@ -17,13 +16,12 @@ struct Cube {
 impl Region for Cube {
     type Point = Vec<f64>;
 
-    fn widths(&self) -> Vec<usize> {
+    fn width(&self) -> usize {
         let d = self.degree as usize;
-        vec![if self.factors == 1 {
-            d + 1
-        } else {
-            (d + 1) * (d + 2) / 2
-        }]
+        match self.factors {
+            1 => d + 1,
+            _ => (d + 1) * (d + 2) / 2,
+        }
     }
 
     fn regressors(&self, x: &Vec<f64>, row: &mut Vec<f64>) {
@@ -112,31 +110,6 @@ fn cubic_regression_on_an_interval_is_measured_where_the_grid_has_no_point() {
     }
 }
 
-#[test]
-fn the_continuous_optimum_on_an_interval_has_guests_points_and_equal_weights() {
-    let region = Cube {
-        factors: 1,
-        degree: 3,
-    };
-    let found = optimum(&region, &region.grid(12)).unwrap();
-    let vandermonde = 2.0 * (2.0 * 0.2_f64.sqrt()) * 0.8_f64.powi(2);
-    assert!(found.excess < 1e-6);
-    assert!(close(
-        found.log_det.exp(),
-        vandermonde.powi(2) / 256.0,
-        1e-6
-    ));
-    let near = |x: f64| -> f64 {
-        let each = found.points.iter().zip(&found.weights);
-        each.filter(|(p, _)| (p[0] - x).abs() < 1e-3)
-            .map(|(_, w)| w)
-            .sum()
-    };
-    for x in [-1.0, -(0.2_f64.sqrt()), 0.2_f64.sqrt(), 1.0] {
-        assert!((near(x) - 0.25).abs() < 1e-3, "{x}: {}", near(x));
-    }
-}
-
 /// Determinant of F'F for points on the square, by the textbook formula.
 fn of_square(points: &[[f64; 2]]) -> f64 {
     let f = DMatrix::from_fn(points.len(), 6, |i, j| {
@@ -180,7 +153,7 @@ fn the_quadratic_on_the_square_has_box_and_drapers_exact_designs() {
 
 #[test]
 fn rows_that_determine_nothing_have_no_design() {
-    let mut rows = Rows::new(&[2]);
+    let mut rows = Rows::new(2);
     rows.push(&[1.0, 1.0]);
     rows.push(&[1.0, 1.0]);
     assert!(exchange::search(&rows, 4, 3, 1).is_empty());

@@ -1,17 +1,17 @@
 //! Designs beside the population of a unit's kind, against formulas of this file.
 
+use mimu::plan::design::Problem;
 use mimu::plan::design::fewest::Widths;
 use mimu::plan::design::judgement::Judgement;
 use mimu::plan::design::model::Setting;
 use mimu::plan::design::population::Population;
 use mimu::plan::design::reach::Fixture;
-use mimu::plan::design::{Problem, model::Model};
 use mimu::prior::{Prior, PriorTable};
 use mimu::quantity::{PerSensor, Sensor};
 use mimu_recording::{RawUnit, Reference};
 use nalgebra::{DMatrix, Matrix3, SMatrix, SVector, Vector3};
 
-use super::{close, terms};
+use super::close;
 
 const G: f64 = 9.80665;
 /// Scale factors in counts per m/s², sines of the angles between the axes, biases in counts.
@@ -45,8 +45,7 @@ fn prior(covariance: &DMatrix<f64>) -> Prior {
 }
 
 fn by_hand() -> Problem {
-    let model = Model::accel(Reference::Gravity, &terms("affine"));
-    Problem::accel(model, Fixture::Hand).unwrap()
+    Problem::accel(Reference::Gravity, Fixture::Hand).unwrap()
 }
 
 fn beside(prior: &Prior, sigma: f64) -> Problem {
@@ -224,8 +223,7 @@ fn what_a_fit_with_a_prior_refuses_is_no_design() {
     // A fit needs three poses beside a prior.
     let two = beside(&kind, 2e-3).best(2, 1).unwrap_err().to_string();
     assert!(two.contains("at least 3"), "{two}");
-    let table = Model::accel(Reference::Table, &terms("affine"));
-    let table = Problem::accel(table, Fixture::ThreeAxis).unwrap();
+    let table = Problem::accel(Reference::Table, Fixture::ThreeAxis).unwrap();
     let refused = table
         .beside(population(), 2e-3, 0.0)
         .unwrap_err()
@@ -247,17 +245,6 @@ fn what_a_fit_with_a_prior_refuses_is_no_design() {
         refused.to_string().contains("no accelerometer"),
         "{refused}"
     );
-}
-
-#[test]
-fn a_term_beyond_the_model_shows_against_the_population_too() {
-    let sigma = 2e-3;
-    let settings = by_hand().best(9, 1).unwrap();
-    let size = |problem: &Problem| problem.judge(&settings, sigma).notices[0].size;
-    // Nine dwells for nine parameters have no residuals.
-    assert_eq!(size(&by_hand()), None);
-    let [wide, narrow] = [1.0, 0.01].map(|s| size(&beside(&prior(&covariance(s)), sigma)).unwrap());
-    assert!(narrow < 0.1 * wide, "{narrow} {wide}");
 }
 
 #[test]

@@ -3,38 +3,12 @@
 use mimu::plan::design::budget::{DwellNoise, Session};
 use mimu::plan::design::model::Setting;
 use mimu::plan::design::reach::Fixture;
-use mimu::plan::design::tour::{Motion, Order, randomised};
+use mimu::plan::design::tour::{Motion, randomised};
 use mimu::quantity::Sensor;
 use mimu_recording::Reference;
 use nalgebra::DMatrix;
 
 use super::{accel, close};
-
-#[test]
-fn no_order_of_seven_dwells_is_shorter_than_the_one_found_by_more_than_a_tenth() {
-    let problem = accel(Reference::Table, "affine");
-    let motion = Motion::of(Fixture::ThreeAxis);
-    let settings = problem.best(7, 1).unwrap();
-    fn shortest(motion: &Motion, done: &mut Vec<Setting>, left: &[Setting]) -> f64 {
-        if left.is_empty() {
-            return motion.moves_s(done);
-        }
-        let each = (0..left.len()).map(|k| {
-            let mut rest = left.to_vec();
-            done.push(rest.remove(k));
-            let time = shortest(motion, done, &rest);
-            done.pop();
-            time
-        });
-        each.fold(f64::INFINITY, f64::min)
-    }
-    let known = shortest(&motion, &mut Vec::new(), &settings);
-    let found = motion.moves_s(&motion.shortest(&settings));
-    assert!(
-        found >= known - 1e-9 && found <= 1.1 * known,
-        "{found} {known}"
-    );
-}
 
 #[test]
 fn a_budget_is_kept_and_more_of_it_helps() {
@@ -48,49 +22,41 @@ fn a_budget_of_a_quarter_of_an_hour_is_kept_and_helps() {
 }
 
 fn kept(budgets: &[f64]) {
-    let problem = accel(Reference::Table, "affine");
+    let problem = accel(Reference::Table);
     let (mut sigmas, mut several_passes) = (Vec::new(), false);
     for &minutes in budgets {
-        for order in [Order::Shortest, Order::Randomised] {
-            let session = Session {
-                time_s: 60.0 * minutes,
-                noise: DwellNoise::fang(Sensor::Accel),
-                motion: Motion::of(Fixture::ThreeAxis),
-                order,
-            };
-            let budget = session.spend(&problem, 1).unwrap();
-            for way in &budget.by_size {
-                assert!(way.time_s() <= 60.0 * minutes + 1e-9);
-                let moves_s = session.motion.moves_s(&way.settings);
-                assert!(close(moves_s, way.moves_s, 1e-12));
-                let judged = problem.judge(&way.settings, way.sigma);
-                assert!(close(judged.mean_sigma, way.mean_sigma, 1e-9));
-                assert!(budget.best.mean_sigma <= way.mean_sigma);
-                // All of its passes measure the same settings.
-                let count = |s: &Setting| way.settings.iter().filter(|t| *t == s).count();
-                assert!(way.settings.iter().all(|s| count(s) % way.passes == 0));
-            }
-            several_passes |= budget.by_size.iter().any(|way| way.passes > 1);
-            sigmas.push(budget.best.mean_sigma);
+        let session = Session {
+            time_s: 60.0 * minutes,
+            noise: DwellNoise::fang(Sensor::Accel),
+            motion: Motion::of(Fixture::ThreeAxis),
+        };
+        let budget = session.spend(&problem, 1).unwrap();
+        for way in &budget.by_size {
+            assert!(way.time_s() <= 60.0 * minutes + 1e-9);
+            let moves_s = session.motion.moves_s(&way.settings);
+            assert!(close(moves_s, way.moves_s, 1e-12));
+            let judged = problem.judge(&way.settings, way.sigma);
+            assert!(close(judged.mean_sigma, way.mean_sigma, 1e-9));
+            assert!(budget.best.mean_sigma <= way.mean_sigma);
+            // All of its passes measure the same settings.
+            let count = |s: &Setting| way.settings.iter().filter(|t| *t == s).count();
+            assert!(way.settings.iter().all(|s| count(s) % way.passes == 0));
         }
+        several_passes |= budget.by_size.iter().any(|way| way.passes > 1);
+        sigmas.push(budget.best.mean_sigma);
     }
     assert!(several_passes);
-    // Shortest and randomised, for each budget.
-    assert!(
-        sigmas.windows(3).all(|s| s[2] < s[0]) && sigmas.chunks(2).all(|s| s[0] <= s[1]),
-        "{sigmas:?}"
-    );
+    assert!(sigmas.is_sorted_by(|a, b| a > b), "{sigmas:?}");
 }
 
 #[test]
 fn random_walk_bounds_the_dwell() {
-    let problem = accel(Reference::Table, "affine");
+    let problem = accel(Reference::Table);
     let spent = |k: f64| {
         let session = Session {
             time_s: 36_000.0,
             noise: DwellNoise { n: 1e-3, b: 0.0, k },
             motion: Motion::of(Fixture::ThreeAxis),
-            order: Order::Shortest,
         };
         session.spend(&problem, 1).unwrap().best.dwell_s
     };
@@ -119,27 +85,37 @@ fn true_over_claimed(settings: &[Setting]) -> f64 {
     (1..4).map(|k| truth[(k, k)] / claimed[(k, k)]).sum::<f64>() / 3.0
 }
 
+/// The next dwell is always the nearest: an order with short moves.
+fn nearest_first(settings: &[Setting]) -> Vec<Setting> {
+    let mut left = settings.to_vec();
+    let mut order = vec![left.remove(0)];
+    while !left.is_empty() {
+        let off = |s: &Setting| order.last().unwrap().up.angle(&s.up);
+        let near = (0..left.len()).min_by(|a, b| off(&left[*a]).total_cmp(&off(&left[*b])));
+        order.push(left.remove(near.unwrap()));
+    }
+    order
+}
+
 #[test]
-fn in_an_order_by_lot_drift_is_scatter_that_a_fit_knows_of_and_in_the_shortest_order_it_is_not() {
-    let problem = accel(Reference::Table, "affine");
+fn in_an_order_by_lot_drift_is_scatter_that_a_fit_knows_of_and_in_an_order_with_short_moves_it_is_not()
+ {
+    let problem = accel(Reference::Table);
     for n in [9, 12, 22] {
         let settings = problem.best(n, 1).unwrap();
-        let shortest = true_over_claimed(&Motion::of(Fixture::ThreeAxis).shortest(&settings));
+        let short = true_over_claimed(&nearest_first(&settings));
         let lots = (0..2000).map(|seed| true_over_claimed(&randomised(&settings, seed)));
         let randomised = lots.sum::<f64>() / 2000.0;
         println!(
-            "{n} dwells: true over claimed variance {shortest:.2} in the shortest order, {randomised:.2} in a randomised one"
+            "{n} dwells: true over claimed variance {short:.2} with short moves, {randomised:.2} in a randomised order"
         );
-        assert!(
-            shortest > 1.5 && randomised < 1.2,
-            "{n}: {shortest} {randomised}"
-        );
+        assert!(short > 1.5 && randomised < 1.2, "{n}: {short} {randomised}");
     }
 }
 
 #[test]
 fn a_lot_leaves_no_dwell_out_and_no_place_to_chance_more_than_another() {
-    let settings = accel(Reference::Table, "affine").best(5, 1).unwrap();
+    let settings = accel(Reference::Table).best(5, 1).unwrap();
     // How often each dwell is at each position: 1/5 of 2000 random orders, within five sigmas.
     let mut counts = [[0_u32; 5]; 5];
     for seed in 0..2000 {

@@ -1,18 +1,19 @@
-//! Estimators that others use, for comparison: each assumes that the die has the temperature of the thermometer.
+//! Estimators of the literature, for comparison: each assumes that the die has the temperature of the thermometer.
 
-use mimu::quantity::Sensor;
-use mimu_recording::error::{Argument, Error, Result};
+use mimu::quantity::{PerSensor, Sensor};
+use mimu_recording::error::{Error, Result};
+use mimu_thermal::basis::Shape;
+use mimu_thermal::curves::TriadCurves;
+use mimu_thermal::joint::Joint;
+use mimu_thermal::path::{fastest, is_one_way, stands};
+use mimu_thermal::profile::Profile;
+use mimu_thermal::row::Row;
+use mimu_thermal::session::Session;
+use mimu_thermal::thermometer::Start;
 use nalgebra::{Matrix3, Matrix4, Matrix4x3, Vector3};
 
-use crate::basis::Shape;
-use crate::curves::TriadCurves;
-use crate::path::{fastest, stands};
 use crate::points::{Point, curves};
-use crate::row::Row;
-use crate::session::Session;
 
-/// Width of the bins of the independent nodes, K.
-const NODE_K: f64 = 10.0;
 /// Cosine of the angle to an axis within which a pose or a turn is along it.
 const ALONG: f64 = 0.98;
 /// Rates below this, rad/s, are rest: fifty times the Earth's.
@@ -25,8 +26,6 @@ const CONSTANT_C: f64 = 25.0;
 /// An estimator of the literature.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Classic {
-    /// Affine fits in bins of 10 K, and a spline through them.
-    Nodes,
     /// The ramp of niu: every cycle of the scheme by itself, cubics through them.
     RampNiu,
     /// Soak, fang section 4.4: one fit per plateau; all 18 scalars of a triad's six poses.
@@ -37,28 +36,31 @@ pub enum Classic {
     SoakConstantM,
 }
 
-impl Classic {
-    /// As on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Nodes => "nodes",
-            Self::RampNiu => "ramp-niu",
-            Self::Soak => "soak",
-            Self::SoakAsPrinted => "soak-fang",
-            Self::SoakConstantM => "soak-constant-m",
-        }
-    }
-}
-
-/// Curves of `sensor` by `classic`; `None` if it was not recorded.
+/// Curves of both triads by `classic`, without a lag.
 ///
 /// # Errors
 /// Too few temperatures at which the inputs determine everything.
-pub fn estimate(
-    sessions: &[Session],
-    sensor: Sensor,
-    classic: Classic,
-) -> Result<Option<TriadCurves>> {
+pub fn estimate(sessions: &[Session], classic: Classic) -> Result<Joint> {
+    let mut curves = PerSensor::default();
+    for sensor in Sensor::BOTH {
+        curves[sensor] = triad(sessions, sensor, classic)?;
+    }
+    let settled = |s: &Session| s.thermometer.die(0.0, Start::Settled);
+    let dies: Vec<_> = sessions.iter().map(settled).collect();
+    Ok(Joint {
+        curves,
+        profiles: PerSensor::both(Profile::fixed(0.0, 0.0)),
+        one_way: is_one_way(sessions, &dies),
+        apart: None,
+        contradicted: PerSensor::default(),
+        noise: PerSensor::default(),
+        starts: vec![Start::Settled; sessions.len()],
+        warnings: Vec::new(),
+    })
+}
+
+/// Curves of `sensor`; `None` if it was not recorded.
+fn triad(sessions: &[Session], sensor: Sensor, classic: Classic) -> Result<Option<TriadCurves>> {
     let rows = |s: &Session| s.rows[sensor].len();
     if sessions.iter().map(rows).sum::<usize>() == 0 {
         return Ok(None);
@@ -70,7 +72,6 @@ pub fn estimate(
     let mut points = Vec::new();
     for session in sessions {
         let groups = match classic {
-            Classic::Nodes => by_temperature(session, sensor),
             Classic::RampNiu => cycles(session, sensor),
             Classic::Soak | Classic::SoakAsPrinted | Classic::SoakConstantM => {
                 plateaus(session, sensor)
@@ -98,11 +99,10 @@ pub fn estimate(
     let count = points.len();
     curves(sensor, &points, shape).map(Some).ok_or_else(|| {
         Error::undetermined(
-            format!("{sensor}, estimator {}", classic.name()),
+            format!("{sensor}, {classic:?}"),
             format!("only {count} temperatures have all poses and turns that this estimator needs"),
-            "use the joint estimator, or repeat the whole scheme at five temperatures or more",
+            "repeat the whole scheme at five temperatures or more",
         )
-        .about(Argument::Estimator)
     })
 }
 
@@ -112,15 +112,6 @@ fn mean_temperature(session: &Session, rows: &[&Row]) -> f64 {
         .iter()
         .map(|r| r.samples * session.thermometer.at(r.middle_s).0);
     sum.sum::<f64>() / n
-}
-
-fn by_temperature(session: &Session, sensor: Sensor) -> Vec<Vec<&Row>> {
-    let bin = |r: &Row| (session.thermometer.at(r.middle_s).0 / NODE_K).floor() as i64;
-    let mut rows: Vec<&Row> = session.rows[sensor].iter().collect();
-    rows.sort_by_key(|r| bin(r));
-    rows.chunk_by(|a, b| bin(a) == bin(b))
-        .map(<[_]>::to_vec)
-        .collect()
 }
 
 /// Segments in which the temperature is constant, whether the dies have settled or not.

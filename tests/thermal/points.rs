@@ -1,13 +1,12 @@
-//! Curves through estimates at single temperatures: the second stage of every estimator but the joint one.
+//! Curves through estimates at single temperatures: the second stage of the estimators of the literature.
 
 use mimu::quantity::Sensor;
 use mimu::signal::blocks::extent;
+use mimu_thermal::basis::{Basis, Shape};
+use mimu_thermal::curves::TriadCurves;
+use mimu_thermal::regression::{CurveKind, Normal, Problem};
+use mimu_thermal::smoothness::{Penalties, TriadFit, fixed, largest};
 use nalgebra::{DMatrix, DVector, Vector3};
-
-use crate::basis::{Basis, Shape};
-use crate::curves::TriadCurves;
-use crate::regression::{CurveKind, Normal, Problem};
-use crate::smoothness::{Penalties, TriadFit, fixed, largest};
 
 /// Forward model at one temperature: P by rows, then b, raw per SI and raw, with variances.
 #[derive(Debug, Clone, Copy)]
