@@ -6,9 +6,8 @@
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
-use super::line::Line;
-use super::search::FINEST;
-use super::welch::{BIN_OVERLAP, Welch, fast_length};
+use super::lines::Line;
+use super::welch::{BIN_OVERLAP, Welch};
 
 /// Means of the spectrum in an octave.
 const PER_OCTAVE: f64 = 6.0;
@@ -18,8 +17,6 @@ const FEWEST_BINS: usize = 4;
 const FEWEST: usize = 10;
 /// Least number of these in which the spectrum is white.
 const FEWEST_WHITE: usize = 6;
-/// Samples of the shortest segment.
-const SHORTEST: usize = 64;
 /// If the misfit has a lower probability, the ends are left out.
 const FITS: f64 = 1e-3;
 /// Least drop in deviance for another term, and margin of the plausible models: as in the model of the Allan curve.
@@ -65,18 +62,7 @@ struct Fitted {
     deviance: f64,
 }
 
-/// N of `rates` (any unit, `dt_s` apart), with an interval of probability `confidence`. The bands of `lines` are excluded, and as much on
-/// both sides of each: the remaining slopes of a bump would pass for flicker noise there. `None` if the spectrum fits such noise in no
-/// band, or is too short.
-pub fn white_band(rates: &[f64], dt_s: f64, lines: &[Line], confidence: f64) -> Option<White> {
-    let length = fast_length(rates.len() / FINEST);
-    if length < SHORTEST {
-        return None;
-    }
-    of_spectrum(&Welch::of(rates, dt_s, length), dt_s, lines, confidence)
-}
-
-/// [`white_band`] from the spectrum of a series, in segments of a [`FINEST`]th of it.
+/// As [`super::Lines::white_band`]; `welch` has the spectrum.
 pub(super) fn of_spectrum(
     welch: &Welch,
     dt_s: f64,
