@@ -12,7 +12,7 @@ mod reml;
 use mimu::nalgebra::DVector;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use reml::{LOWEST, Model};
+use reml::Model;
 
 /// Measurements of units that were measured repeatedly.
 #[derive(Debug, Clone)]
@@ -155,12 +155,9 @@ impl Study {
             cells: interactions.iter().map(|f| self.cells(*f)).collect(),
             rows: self.rows(),
         };
-        let logs = model.maximise();
-        let variances: Vec<f64> = logs
-            .iter()
-            .map(|l| if *l <= LOWEST { 0.0 } else { l.exp() * total })
-            .collect();
-        let covariance = model.covariance(&logs);
+        let standard = model.maximise();
+        let covariance = model.covariance(&standard);
+        let variances: Vec<f64> = standard.iter().map(|v| v * total).collect();
         let mut names = vec![
             ("repeatability".to_string(), false),
             ("unit".to_string(), false),
