@@ -18,5 +18,6 @@ mod welch;
 mod white;
 
 pub use self::lines::{Line, Lines};
+pub use self::welch::density_in;
 pub(crate) use self::welch::sum_over;
 pub use self::white::White;
