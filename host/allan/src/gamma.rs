@@ -61,7 +61,11 @@ impl<const TERMS: usize> GammaFit<TERMS> {
             variance = inverse[(0, 0)] / (scale[0] * scale[0]);
             let mut change = 0.0_f64;
             for (expected, one) in expected.iter_mut().zip(all) {
-                let next: f64 = coefficients.iter().zip(&one.basis).map(|(a, b)| a * b).sum();
+                let next: f64 = coefficients
+                    .iter()
+                    .zip(&one.basis)
+                    .map(|(a, b)| a * b)
+                    .sum();
                 // A step to zero or below is shortened.
                 let next = next.max(0.1 * *expected);
                 change = change.max((next / *expected - 1.0).abs());

@@ -11,6 +11,6 @@ mod selection;
 mod terms;
 mod unseen;
 
-pub(crate) use self::selection::PLAUSIBLE;
 pub use self::estimator::{Estimator, allan_factors, hadamard_factors};
+pub(crate) use self::selection::PLAUSIBLE;
 pub use self::terms::{Coefficient, FLOOR, NoiseModel, Reason, Term, Unseen};

@@ -398,9 +398,8 @@ impl Channel {
 
     /// Computes the curve of the channel, and the model.
     fn analyse(&mut self, integrated: &Integrated, estimator: &Estimator, options: &Options) {
-        let curve = |kind, times| {
-            integrated.curve(kind, &Spacing::Samples(times), options.confidence)
-        };
+        let curve =
+            |kind, times| integrated.curve(kind, &Spacing::Samples(times), options.confidence);
         self.curve = curve(options.kind, shown(self.samples, options));
         let allan = curve(Deviation::Allan, allan_factors(self.samples));
         let hadamard = curve(Deviation::Hadamard, hadamard_factors(self.samples));
@@ -412,7 +411,11 @@ impl Channel {
     fn read_white_band(&mut self, dt_s: f64, confidence: f64) {
         let Some(model) = &mut self.model else { return };
         let shortened = model.range_s[0] > 1.5 * dt_s;
-        if model.get(Term::N).is_ok() && model.excess.is_none() && !shortened && self.spectrum.lines.is_empty() {
+        if model.get(Term::N).is_ok()
+            && model.excess.is_none()
+            && !shortened
+            && self.spectrum.lines.is_empty()
+        {
             return;
         }
         let Some(white) = self.spectrum.white_band(dt_s, confidence) else {
@@ -464,8 +467,7 @@ impl Channel {
         });
         if options.kind != Deviation::Hadamard {
             let times = Spacing::Samples(shown(self.samples, options));
-            self.hadamard =
-                Some(integrated.curve(Deviation::Hadamard, &times, options.confidence));
+            self.hadamard = Some(integrated.curve(Deviation::Hadamard, &times, options.confidence));
         }
     }
 }

@@ -50,7 +50,9 @@ impl<F: Fn(&[f64]) -> Option<f64> + Sync> Search<F> {
     /// The most likely values of `free`, from those of `start`.
     pub fn maximise(&self, start: Fitted, free: &[usize]) -> Fitted {
         let before = start.log_likelihood;
-        let mut best = free.iter().fold(start, |best, k| self.along(best, *k, None));
+        let mut best = free
+            .iter()
+            .fold(start, |best, k| self.along(best, *k, None));
         let mut step = match best.log_likelihood - before < GAIN {
             true => FINER * LOCAL,
             false => LOCAL,
@@ -73,7 +75,9 @@ impl<F: Fn(&[f64]) -> Option<f64> + Sync> Search<F> {
     ) -> Fitted {
         for _ in 0..rounds {
             let before = best.log_likelihood;
-            best = free.iter().fold(best, |best, k| self.along(best, *k, Some(step)));
+            best = free
+                .iter()
+                .fold(best, |best, k| self.along(best, *k, Some(step)));
             if best.log_likelihood - before < least {
                 break;
             }

@@ -189,7 +189,10 @@ impl Quantities {
         for (axis, c) in sensor.channels().enumerate() {
             let readings = of(c);
             let step = lsb.or(rest.step[c]);
-            match step.and_then(|step| codes(readings, step)).map(|codes| stuck_bits(&codes)) {
+            match step
+                .and_then(|step| codes(readings, step))
+                .map(|codes| stuck_bits(&codes))
+            {
                 Some(Some(count)) => self.add(of_bits, Some((sensor, axis)), count.into(), 0.0),
                 Some(None) => self.missing(of_bits, Some(axis), "the codes do not change"),
                 None => self.missing(of_bits, Some(axis), "the readings are no whole codes"),
@@ -197,9 +200,8 @@ impl Quantities {
             let (run, mut by_chance) = (equal_run(readings), rest.longest_run[c]);
             if run == readings.len() {
                 let mut others = sensor.channels().filter(|o| *o != c);
-                let coarse = lsb.is_some_and(|step| {
-                    others.any(|o| is_coarse(rms(of(o)).0.powi(2), step))
-                });
+                let coarse =
+                    lsb.is_some_and(|step| others.any(|o| is_coarse(rms(of(o)).0.powi(2), step)));
                 if coarse {
                     let why = "its value never changes: it is dead, or its steps are coarser than its noise";
                     self.missing(of_run, Some(axis), why);

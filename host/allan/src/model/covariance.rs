@@ -206,7 +206,10 @@ mod tests {
             (over(Deviation::Allan, 32), over(Deviation::Allan, 16)),
             (over(Deviation::Hadamard, 40), over(Deviation::Allan, 300)),
             (over(Deviation::Hadamard, 125), over(Deviation::Allan, 8)),
-            (over(Deviation::Hadamard, 33), over(Deviation::Hadamard, 200)),
+            (
+                over(Deviation::Hadamard, 33),
+                over(Deviation::Hadamard, 200),
+            ),
             (over(Deviation::Hadamard, 200), over(Deviation::Allan, 750)),
             (over(Deviation::Allan, 750), over(Deviation::Allan, 750)),
             (over(Deviation::Allan, 256), over(Deviation::Allan, 256)),

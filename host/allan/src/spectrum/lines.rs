@@ -122,7 +122,11 @@ impl Excess {
         Self {
             df_hz: welch.df_hz,
             first: *band.bins.start(),
-            bins: band.bins.clone().map(|b| resolution.excess(b).max(0.0)).collect(),
+            bins: band
+                .bins
+                .clone()
+                .map(|b| resolution.excess(b).max(0.0))
+                .collect(),
             power: 2.0 * welch.df_hz * power,
             beneath: 2.0 * welch.df_hz * (all - above),
             dof: welch.dof * all * all / (BIN_OVERLAP * squares),

@@ -141,22 +141,28 @@ fn fit(means: &[Mean], shortened: bool, z: f64) -> Option<White> {
     if -best.coefficients[BEND] * top.of.basis[BEND] > BENT * best.coefficients[0] {
         return None;
     }
-    let plausible =
-        |m: &&GammaFit<TERMS>| m.cost() <= best.cost() + PLAUSIBLE && m.deviance <= best.deviance + PLAUSIBLE;
+    let plausible = |m: &&GammaFit<TERMS>| {
+        m.cost() <= best.cost() + PLAUSIBLE && m.deviance <= best.deviance + PLAUSIBLE
+    };
     let (mut lower, mut upper) = (f64::INFINITY, 0.0f64);
     for model in models.iter().filter(plausible) {
         let sigma = model.variance.sqrt();
         lower = lower.min((model.coefficients[0] - z * sigma).max(0.0));
         upper = upper.max(model.coefficients[0] + z * sigma);
     }
-    let slow = |m: &Mean| (1..BEND).map(|k| best.coefficients[k] * m.of.basis[k]).sum::<f64>();
+    let slow = |m: &Mean| {
+        (1..BEND)
+            .map(|k| best.coefficients[k] * m.of.basis[k])
+            .sum::<f64>()
+    };
     let is_white = |m: &&Mean| {
         let other = slow(m) + best.coefficients[BEND].max(0.0) * m.of.basis[BEND];
         other < best.coefficients[0]
     };
     let white: Vec<&Mean> = means.iter().filter(is_white).collect();
-    let seen =
-        lower > 0.0 && best.coefficients[0] > SEEN * best.variance.sqrt() && white.len() >= FEWEST_WHITE;
+    let seen = lower > 0.0
+        && best.coefficients[0] > SEEN * best.variance.sqrt()
+        && white.len() >= FEWEST_WHITE;
     let value = best.coefficients[0].max(0.0).sqrt();
     Some(White {
         value,

@@ -436,7 +436,8 @@ fn a_swaying_building_is_named_and_the_white_noise_beneath_is_exported() {
         "{line}"
     );
     assert!(
-        (line["frequency_hz"].as_f64().unwrap() - 0.56).abs() < line["resolution_hz"].as_f64().unwrap(),
+        (line["frequency_hz"].as_f64().unwrap() - 0.56).abs()
+            < line["resolution_hz"].as_f64().unwrap(),
         "{line}"
     );
     let svg = std::fs::read_to_string(folder.path().join("a.svg")).unwrap();

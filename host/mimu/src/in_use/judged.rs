@@ -30,8 +30,7 @@ pub(super) fn consistency(session: &Session) -> Consistency {
         let fitted = session.filter_densities(None, |index| half_of(index) != Some(half));
         // The reference errs alike for all: only the unit is judged.
         let mut reference = session.known(false).values;
-        reference[FILTER..OF_FILTER.end]
-            .copy_from_slice(&fitted.values[FILTER..OF_FILTER.end]);
+        reference[FILTER..OF_FILTER.end].copy_from_slice(&fitted.values[FILTER..OF_FILTER.end]);
         let of = |calibration| Model {
             values: reference.clone(),
             calibration,
