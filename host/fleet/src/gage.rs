@@ -10,6 +10,7 @@
 mod reml;
 
 use mimu::nalgebra::DVector;
+use mimu_recording::statistics::mean_and_variance;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use reml::Model;
@@ -140,9 +141,7 @@ impl Study {
 
     /// The variance components of `values`, one for each measurement. `None` if they do not differ.
     pub fn fit(&self, values: &[f64]) -> Option<Gage> {
-        let count = values.len() as f64;
-        let mean = values.iter().sum::<f64>() / count;
-        let total = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (count - 1.0);
+        let (mean, total) = mean_and_variance(values.iter().copied());
         if !(total > 0.0) {
             return None;
         }

@@ -10,6 +10,7 @@ use std::path::Path;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::read_text;
 use mimu_recording::result_file::stage;
+use mimu_recording::statistics::mean_and_variance;
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
@@ -167,12 +168,7 @@ fn is_judged(measured: &Measured) -> bool {
 /// The prediction interval of one more value: `t · s √(1 + 1/n)`, with the larger of the scatter between the sessions and the noise within them.
 fn compared(today: &Measured, reference: &[&GoldenValue], tests: usize) -> Moved {
     let n = reference.len() as f64;
-    let mean = reference.iter().map(|v| v.value).sum::<f64>() / n;
-    let between = reference
-        .iter()
-        .map(|v| (v.value - mean).powi(2))
-        .sum::<f64>()
-        / (n - 1.0);
+    let (mean, between) = mean_and_variance(reference.iter().map(|v| v.value));
     let within = reference
         .iter()
         .map(|v| v.repeatability.powi(2))

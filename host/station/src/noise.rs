@@ -1,6 +1,7 @@
 //! Noise of a channel at rest: rms, and density in a band.
 
 use mimu_allan::spectrum::density_in;
+use mimu_recording::statistics::Line;
 
 /// A figure with its standard uncertainty.
 pub type WithSigma = (f64, f64);
@@ -35,16 +36,10 @@ pub fn rms(readings: &[f64]) -> WithSigma {
 
 /// `readings` minus their straight line by least squares.
 fn about_line(readings: &[f64]) -> Vec<f64> {
-    let n = readings.len() as f64;
-    let middle = 0.5 * (n - 1.0);
-    let mean = readings.iter().map(|v| v - readings[0]).sum::<f64>() / n + readings[0];
-    let slope = (0..)
-        .zip(readings)
-        .map(|(k, v)| (f64::from(k) - middle) * (v - mean))
-        .sum::<f64>()
-        / (n * (n * n - 1.0) / 12.0);
-    let line = |k: i32| mean + slope * (f64::from(k) - middle);
-    (0..).zip(readings).map(|(k, v)| v - line(k)).collect()
+    let points = || (0..).zip(readings).map(|(k, v)| [f64::from(k), *v]);
+    let line = Line::through(points());
+    let rest = |[k, v]: [f64; 2]| v - line.map_or(v, |line| line.at(k));
+    points().map(rest).collect()
 }
 
 /// Band whose mean density is reported, Hz. Data sheets state the density at 10 Hz.

@@ -4,6 +4,7 @@ use mimu::calibration::Calibration;
 use mimu::quantity::{AXES, Sensor, inverse_names};
 use mimu::triad::Forward;
 use mimu_recording::error::{Error, Result};
+use mimu_recording::statistics::root_mean_square;
 use serde::Serialize;
 
 use crate::warning::Warning;
@@ -157,7 +158,7 @@ fn of_sensor(
                 _ => b[k] - a[k],
             })
             .collect();
-        let rms = (value.iter().map(|v| v * v).sum::<f64>() / COUNT as f64).sqrt();
+        let rms = root_mean_square(value.iter().copied());
         let at = (0..COUNT)
             .max_by(|i, j| value[*i].abs().total_cmp(&value[*j].abs()))
             .unwrap_or(0);

@@ -458,7 +458,7 @@ pub fn nominal(calibrated: &Affine<f64>) -> Option<Affine<f64>> {
 }
 
 fn rms(values: &[f64]) -> f64 {
-    (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt()
+    mimu_recording::statistics::root_mean_square(values.iter().copied())
 }
 
 fn largest(values: &[f64]) -> f64 {

@@ -328,15 +328,17 @@ fn session(
         components: component::all(allan.mean_white(), has_positions, reference == "rests"),
         walks: allan.walks(apart_s.max(1e-3)),
         calibration: covariance,
-        matrices: PerSensor::from_fn(|s| {
-            calibration
-                .inverse(s)
-                .map_or_else(Matrix3::identity, |c| c.matrix)
-        }),
+        matrices: matrices(calibration),
         mounted: reference == "trajectory",
         earth_is_known: false,
         closures,
     }
+}
+
+/// C of both sensors.
+fn matrices(calibration: &Calibration) -> PerSensor<Matrix3<f64>> {
+    let of = |s| calibration.inverse(s).map(|c| c.matrix);
+    PerSensor::from_fn(|s| of(s).unwrap_or_else(Matrix3::identity))
 }
 
 /// Components that a filter has, and the reference's.
