@@ -367,17 +367,6 @@ fn not_finite(bad: NotFinite) -> Error {
     )
 }
 
-/// Averaging times that are shown, in samples.
-fn shown(samples: usize, options: &Options) -> Vec<usize> {
-    let step = 1.0 / options.per_decade as f64;
-    let mut shown: Vec<usize> = (0..)
-        .map(|k| 10f64.powf(f64::from(k) * step).round() as usize)
-        .take_while(|m| 2 * m <= samples)
-        .collect();
-    shown.dedup();
-    shown
-}
-
 impl Channel {
     /// The raw channel `i` before anything is computed from its `samples`.
     fn of(i: usize, unit: Unit, samples: usize) -> Self {
@@ -398,11 +387,14 @@ impl Channel {
 
     /// Computes the curve of the channel, and the model.
     fn analyse(&mut self, integrated: &Integrated, estimator: &Estimator, options: &Options) {
-        let curve =
-            |kind, times| integrated.curve(kind, &Spacing::Samples(times), options.confidence);
-        self.curve = curve(options.kind, shown(self.samples, options));
-        let allan = curve(Deviation::Allan, allan_factors(self.samples));
-        let hadamard = curve(Deviation::Hadamard, hadamard_factors(self.samples));
+        let curve = |kind, times| integrated.curve(kind, &times, options.confidence);
+        self.curve = curve(options.kind, Spacing::PerDecade(options.per_decade));
+        let allan = Spacing::Samples(allan_factors(self.samples));
+        let hadamard = Spacing::Samples(hadamard_factors(self.samples));
+        let [allan, hadamard] = [
+            curve(Deviation::Allan, allan),
+            curve(Deviation::Hadamard, hadamard),
+        ];
         self.model = estimator.fit(&allan, &hadamard);
         self.read_white_band(integrated.dt_s(), options.confidence);
     }
@@ -466,7 +458,7 @@ impl Channel {
             warning: Box::new(warning),
         });
         if options.kind != Deviation::Hadamard {
-            let times = Spacing::Samples(shown(self.samples, options));
+            let times = Spacing::PerDecade(options.per_decade);
             self.hadamard = Some(integrated.curve(Deviation::Hadamard, &times, options.confidence));
         }
     }
