@@ -373,16 +373,8 @@ mod tests {
 
     #[test]
     fn the_interval_of_the_measurement_holds_as_often_as_it_says_with_three_operators() {
-        // Normal numbers by Box and Muller from a sequence of Weyl, hashed.
-        let mut state = 1_u64;
-        let mut even = || {
-            state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-            let z = (state ^ (state >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-            let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-            ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-        };
-        let mut normal =
-            || (-2.0 * (1.0 - even()).ln()).sqrt() * (std::f64::consts::TAU * even()).cos();
+        let mut random = mimu_rig::random::Random::new(1, "gage");
+        let mut normal = || random.normal();
         let studies = 200;
         for between in [0.0, 0.3, 1.0] {
             let mut held = 0;

@@ -43,19 +43,10 @@ pub fn equal_run(readings: &[f64]) -> usize {
 mod tests {
     use super::*;
 
-    /// Codes about `level` with noise of `sigma` codes: sums of twelve uniform numbers.
+    /// Codes about `level` with noise of `sigma` codes.
     fn noisy(level: f64, sigma: f64, seed: u64) -> Vec<i64> {
-        let mut state = seed;
-        let mut uniform = || {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1);
-            (state >> 11) as f64 / (1u64 << 53) as f64
-        };
-        let code = |_| {
-            let normal = (0..12).map(|_| uniform()).sum::<f64>() - 6.0;
-            (level + sigma * normal).round() as i64
-        };
+        let mut random = mimu_rig::random::Random::new(seed, "bits");
+        let code = |_| (level + sigma * random.normal()).round() as i64;
         (0..2000).map(code).collect()
     }
 

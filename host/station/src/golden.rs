@@ -189,16 +189,10 @@ fn compared(today: &Measured, reference: &[&GoldenValue], tests: usize) -> Moved
 mod tests {
     use super::*;
 
-    /// A normal number with standard deviation 1, by Box and Muller.
+    /// Normal numbers with standard deviation 1.
     fn normals(seed: u64) -> impl FnMut() -> f64 {
-        let mut state = seed;
-        let mut uniform = move || {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1);
-            ((state >> 11) as f64 + 0.5) / (1u64 << 53) as f64
-        };
-        move || (-2.0 * uniform().ln()).sqrt() * (std::f64::consts::TAU * uniform()).cos()
+        let mut random = mimu_rig::random::Random::new(seed, "golden");
+        move || random.normal()
     }
 
     /// A session whose quantities scatter by 1 between sessions, measured with 0.1, and are `off` the first ones.

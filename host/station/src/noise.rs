@@ -57,17 +57,10 @@ pub fn density(readings: &[f64], dt_s: f64) -> Option<WithSigma> {
 mod tests {
     use super::*;
 
-    /// White noise of standard deviation 1 by Marsaglia's xorshift and twelve uniform numbers.
+    /// White noise of standard deviation 1.
     fn white(n: usize, seed: u64) -> Vec<f64> {
-        let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
-        let mut uniform = || {
-            state ^= state << 13;
-            state ^= state >> 7;
-            state ^= state << 17;
-            (state >> 11) as f64 / (1u64 << 53) as f64
-        };
-        let normal = |_| (0..12).map(|_| uniform()).sum::<f64>() - 6.0;
-        (0..n).map(normal).collect()
+        let mut random = mimu_rig::random::Random::new(seed, "white");
+        (0..n).map(|_| random.normal()).collect()
     }
 
     /// Share of `figures` within two of their standard uncertainties of `truth`.

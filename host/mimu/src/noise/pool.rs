@@ -164,6 +164,8 @@ fn fit(points: &[Point]) -> AllanModel {
 
 #[cfg(test)]
 mod tests {
+    use mimu_rig::random::Random;
+
     use super::*;
 
     #[test]
@@ -210,14 +212,6 @@ mod tests {
         );
     }
 
-    /// Uniformly distributed over an interval of length 1, mean 0.
-    fn uniform(state: &mut u64) -> f64 {
-        *state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (*state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
-    }
-
     fn series(
         ramps: bool,
         dwells: usize,
@@ -234,8 +228,8 @@ mod tests {
     #[test]
     fn an_even_drift_is_no_noise_where_the_temperature_ramps() {
         let found = |ramps: bool, slope: f64| {
-            let mut state = 7;
-            let mut next = || uniform(&mut state);
+            let mut random = Random::new(7, "pool");
+            let mut next = || random.uniform() - 0.5;
             pooled(series(ramps, 50, &mut next, slope).into_iter(), 0.1)
         };
         let still = found(true, 0.0);
@@ -254,10 +248,10 @@ mod tests {
     #[test]
     fn a_random_walk_has_the_same_size_by_both_variances() {
         let found = |ramps: bool| {
-            let mut state = 11;
+            let mut random = Random::new(11, "pool");
             let mut at = 0.0;
             let mut next = || {
-                at += uniform(&mut state);
+                at += random.uniform() - 0.5;
                 at
             };
             pooled(series(ramps, 200, &mut next, 0.0).into_iter(), 1.0).model
