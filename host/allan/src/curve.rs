@@ -11,7 +11,7 @@
 //! samples on, however densely the times are spaced (`benches/allan.rs`).
 
 use super::bounds::{self, Estimator};
-use super::deviation::{ALL_TERMS, BLOCK, Integrated, Plan, sums_of_squares};
+use super::deviation::{ALL_TERMS, BLOCK, Integrated, Plan, Squares, sums_of_squares};
 use super::power_law::power_law;
 use super::{Deviation, NotFinite, Point, Spacing};
 
@@ -37,9 +37,7 @@ pub fn curve(
     spacing: &Spacing,
     confidence: f64,
 ) -> Result<Vec<Point>, NotFinite> {
-    let mut integrated = Integrated::empty(dt_s);
-    integrated.push(rates)?;
-    Ok(integrated.curve(kind, spacing, confidence))
+    Ok(Integrated::new(rates.to_vec(), dt_s)?.curve(kind, spacing, confidence))
 }
 
 /// The same from the integral (angle, velocity, "phase"), in the unit of the integral per second.
@@ -80,6 +78,13 @@ impl Spacing {
 }
 
 impl Integrated {
+    /// Number of all differences of a `kind`, Allan or Hadamard, over clusters of `m`, and the sum of their variances, each on its own.
+    pub fn variances(&self, kind: Deviation, m: usize) -> (usize, f64) {
+        let terms = kind.terms(self.x().len(), m);
+        let sum = Squares::new(self.x(), kind).sum(m, 1, 0..terms);
+        (terms, sum / (kind.squares() * (m * m) as f64))
+    }
+
     /// Deviation at every averaging time of `spacing` that has at least one difference, ascending, with bounds at
     /// `confidence` (between 0 and 1).
     pub fn curve(&self, kind: Deviation, spacing: &Spacing, confidence: f64) -> Vec<Point> {
@@ -114,11 +119,8 @@ impl Integrated {
         let x = self.x();
         let terms = all.div_ceil(stride);
         let (tau, mean) = (m as f64, sum_of_squares / terms as f64);
-        let variance = match kind {
-            Deviation::Allan => mean / (2.0 * tau.powi(2)),
-            Deviation::Hadamard => mean / (6.0 * tau.powi(2)),
-            Deviation::Modified => mean / (2.0 * tau.powi(4)),
-        };
+        let power = if kind == Deviation::Modified { 4 } else { 2 };
+        let variance = mean / (kind.squares() * tau.powi(power));
         let deviation = variance.sqrt() / self.step();
         let alpha = power_law(x, kind, m);
         let edf = Estimator {

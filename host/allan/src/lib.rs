@@ -6,6 +6,7 @@
 //! | `power_law`  | power law of the noise at each averaging time                              |
 //! | [`bounds`]   | degrees of freedom for it, chi-square bounds                               |
 //! | [`curve`]    | all of these at any averaging times                                        |
+//! | [`gamma`]    | variances as sums of terms, by maximum likelihood                          |
 //! | [`model`]    | N, B, K, Q and R fitted to the whole curve, with intervals                 |
 //! | [`variance`] | N, B and K alone, as the variance of a mean                                |
 //! | [`spectrum`] | lines and bumps that are not noise of the sensor, and the band in which it is white |
@@ -13,6 +14,7 @@
 pub mod bounds;
 pub mod curve;
 pub mod deviation;
+pub mod gamma;
 pub mod model;
 mod power_law;
 pub mod spectrum;
@@ -43,12 +45,33 @@ impl Deviation {
 }
 
 impl Deviation {
-    /// Differences of the rates: 2 for the second difference of the integral, 3 for the third.
-    pub(crate) fn order(self) -> usize {
+    /// Number of neighbouring means in one difference.
+    pub fn order(self) -> usize {
         match self {
             Self::Allan | Self::Modified => 2,
             Self::Hadamard => 3,
         }
+    }
+
+    /// Mean square of a difference over the variance, for differences of the integral over one sample.
+    pub(crate) fn squares(self) -> f64 {
+        match self {
+            Self::Allan | Self::Modified => 2.0,
+            Self::Hadamard => 6.0,
+        }
+    }
+
+    /// This variance at `tau` of noise whose Allan variance is 1/τ², 1/τ, 1, τ or τ²; Allan and Hadamard only (NIST SP 1065, table 6).
+    pub fn basis(self, tau: f64) -> [f64; 5] {
+        let ratios = match self {
+            Self::Allan | Self::Modified => [1.0; 5],
+            Self::Hadamard => {
+                let flicker = (256f64 / 27.0).ln() / (4.0 * std::f64::consts::LN_2);
+                [10.0 / 9.0, 1.0, flicker, 0.5, 0.0]
+            }
+        };
+        let allan = [1.0 / (tau * tau), 1.0 / tau, 1.0, tau, tau * tau];
+        std::array::from_fn(|k| allan[k] * ratios[k])
     }
 
     /// Number of differences that `points` of the integral have at cluster length `m`.

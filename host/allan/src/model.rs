@@ -12,4 +12,5 @@ mod terms;
 mod unseen;
 
 pub use self::estimator::{Estimator, allan_factors, hadamard_factors};
+pub(crate) use self::selection::PLAUSIBLE;
 pub use self::terms::{Coefficient, FLOOR, NoiseModel, Reason, Term, Unseen};

@@ -8,23 +8,16 @@
 //! | `welch`        | averaged periodograms, two-sided densities                 |
 //! | `floor`        | local floor of one, from the medians beside each frequency |
 //! | `search`       | which frequencies stand above it, by more than chance      |
-//! | `transform`    | the whole series by frequency                              |
-//! | `sinusoid`     | amplitude, phase and frequency of a steady line            |
-//! | `flatten`      | bands brought down to the floor                            |
-//! | `remove_lines` | all of these: a series without its lines, and the lines    |
+//! | `lines`        | their frequency, width and effective value                 |
 //! | `white`        | N from the band in which the spectrum is flat              |
 
-mod flatten;
 mod floor;
-mod line;
-mod remove_lines;
+mod lines;
 mod search;
-mod sinusoid;
-mod transform;
 mod welch;
 mod white;
 
-pub use self::line::Line;
-pub use self::remove_lines::{WithoutLines, remove_lines, remove_lines_after};
+pub use self::lines::{Line, Lines};
+pub use self::welch::density_in;
 pub(crate) use self::welch::sum_over;
-pub use self::white::{White, white_band};
+pub use self::white::White;

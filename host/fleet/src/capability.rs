@@ -9,6 +9,7 @@ use std::collections::BTreeMap;
 use mimu::data_sheet::{Property, Row};
 use mimu::quantity::Sensor;
 use mimu_recording::NORMAL_95;
+use mimu_recording::statistics::mean_and_variance;
 use serde::Serialize;
 
 /// A property of an axis over the fleet.
@@ -106,8 +107,7 @@ fn index(row: &Row, values: &[(f64, Option<f64>)]) -> Option<Capability> {
     if values.len() < FEWEST {
         return None;
     }
-    let mean = values.iter().map(|v| v.0).sum::<f64>() / count;
-    let variance = values.iter().map(|v| (v.0 - mean).powi(2)).sum::<f64>() / (count - 1.0);
+    let (mean, variance) = mean_and_variance(values.iter().map(|v| v.0));
     let halves: Option<f64> = values
         .iter()
         .map(|v| v.1.map(|h| (h / NORMAL_95).powi(2)))

@@ -122,6 +122,8 @@ pub mod turntable;
 #[doc(hidden)]
 pub mod unseen;
 #[doc(hidden)]
+pub mod variance_search;
+#[doc(hidden)]
 pub mod warning;
 
 pub use calibration::Calibration;

@@ -31,7 +31,7 @@ use mimu_allan::deviation::Integrated;
 use mimu_allan::model::{
     Coefficient, Estimator, NoiseModel, Term, allan_factors, hadamard_factors,
 };
-use mimu_allan::spectrum::{WithoutLines, remove_lines_after};
+use mimu_allan::spectrum::Lines;
 use mimu_allan::{Deviation, NotFinite, Point, Spacing};
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::health::{At, Finding, Temperatures};
@@ -81,10 +81,8 @@ pub struct Channel {
     pub curve: Vec<Point>,
     /// Hadamard deviation, if the curve shows a drift.
     pub hadamard: Option<Vec<Point>>,
-    /// Lines of its spectrum, which the model excludes.
-    pub spectrum: WithoutLines,
-    /// [`Channel::curve`] without the lines, if there are any.
-    pub without_lines: Option<Vec<Point>>,
+    /// Lines of its spectrum.
+    pub spectrum: Lines,
     /// The noise model; `None` where the record has too few octaves for one.
     pub model: Option<NoiseModel>,
     /// Band of the spectrum that N was read from, Hz, where the Allan curve does not show it.
@@ -235,26 +233,20 @@ impl Found<'_> {
             .temperature
             .and_then(|t| t.against(&values.suitability.levels));
         self.judged.push((i, values.suitability));
-        let mut rates = values.rates;
-        // Only its curves are kept: the integral is as long as the series.
-        let mut as_it_is = None;
-        let spectrum = remove_lines_after(&mut rates, dt_s, options.confidence, |rates| {
-            as_it_is = Some(AsItIs::of(rates, dt_s, options));
-        });
-        let without_lines = Integrated::new(rates, dt_s).map_err(not_finite)?;
+        let spectrum = Lines::of(&values.rates, dt_s, options.confidence);
+        let integrated = Integrated::new(values.rates, dt_s).map_err(not_finite)?;
         next();
         let mut channel = Channel::of(i, unit, samples);
         channel.masked = values.masked;
         channel.spectrum = spectrum;
-        let as_it_is = as_it_is.transpose()?;
-        channel.analyse(as_it_is.as_ref(), &without_lines, estimator, options);
-        let hadamard = || match as_it_is {
-            Some(curves) => curves.hadamard,
-            None => hadamard(&without_lines, options),
-        };
-        channel.judge_drift(hadamard, heat, options, &mut self.warnings);
-        if channel.spectrum.remains {
-            self.warnings.push(Warning::UnsteadyLines.of_channel(i));
+        channel.analyse(&integrated, estimator, options);
+        channel.judge_drift(&integrated, heat, options, &mut self.warnings);
+        if !channel.spectrum.lines.is_empty() {
+            let lines_hz = channel.spectrum.lines.iter().map(|l| l.frequency_hz);
+            let warning = Warning::Lines {
+                hz: lines_hz.collect(),
+            };
+            self.warnings.push(warning.of_channel(i));
         }
         channel.spectrum = channel.spectrum.without_spectrum();
         self.channels.push(channel);
@@ -375,41 +367,6 @@ fn not_finite(bad: NotFinite) -> Error {
     )
 }
 
-/// Curves of a channel with its lines.
-struct AsItIs {
-    curve: Vec<Point>,
-    hadamard: Vec<Point>,
-}
-
-impl AsItIs {
-    fn of(rates: &[f64], dt_s: f64, options: &Options) -> Result<Self> {
-        let mut integrated = Integrated::empty(dt_s);
-        integrated.push(rates).map_err(not_finite)?;
-        let times = Spacing::Samples(shown(rates.len(), options));
-        Ok(Self {
-            curve: integrated.curve(options.kind, &times, options.confidence),
-            hadamard: hadamard(&integrated, options),
-        })
-    }
-}
-
-/// Averaging times that are shown, in samples.
-fn shown(samples: usize, options: &Options) -> Vec<usize> {
-    let step = 1.0 / options.per_decade as f64;
-    let mut shown: Vec<usize> = (0..)
-        .map(|k| 10f64.powf(f64::from(k) * step).round() as usize)
-        .take_while(|m| 2 * m <= samples)
-        .collect();
-    shown.dedup();
-    shown
-}
-
-/// Hadamard deviation at the times that are shown.
-fn hadamard(integrated: &Integrated, options: &Options) -> Vec<Point> {
-    let times = Spacing::Samples(shown(integrated.samples(), options));
-    integrated.curve(Deviation::Hadamard, &times, options.confidence)
-}
-
 impl Channel {
     /// The raw channel `i` before anything is computed from its `samples`.
     fn of(i: usize, unit: Unit, samples: usize) -> Self {
@@ -422,54 +379,35 @@ impl Channel {
             masked: None,
             curve: Vec::new(),
             hadamard: None,
-            spectrum: WithoutLines::default(),
-            without_lines: None,
+            spectrum: Lines::default(),
             model: None,
             n_band_hz: None,
         }
     }
 
-    /// Computes the curve of the channel with its lines, and the model without them. `as_it_is` are the curves with lines, if there are
-    /// any; `without_lines` is the integral without them.
-    fn analyse(
-        &mut self,
-        as_it_is: Option<&AsItIs>,
-        without_lines: &Integrated,
-        estimator: &Estimator,
-        options: &Options,
-    ) {
-        let curve = |of: &Integrated, kind, times: &[usize]| {
-            of.curve(kind, &Spacing::Samples(times.into()), options.confidence)
-        };
-        let own = curve(without_lines, options.kind, &shown(self.samples, options));
-        match as_it_is {
-            Some(with_lines) => {
-                self.curve.clone_from(&with_lines.curve);
-                self.without_lines = Some(own);
-            }
-            None => self.curve = own,
-        }
-        let allan = curve(
-            without_lines,
-            Deviation::Allan,
-            &allan_factors(self.samples),
-        );
-        let hadamard = curve(
-            without_lines,
-            Deviation::Hadamard,
-            &hadamard_factors(self.samples),
-        );
+    /// Computes the curve of the channel, and the model.
+    fn analyse(&mut self, integrated: &Integrated, estimator: &Estimator, options: &Options) {
+        let curve = |kind, times| integrated.curve(kind, &times, options.confidence);
+        self.curve = curve(options.kind, Spacing::PerDecade(options.per_decade));
+        let allan = Spacing::Samples(allan_factors(self.samples));
+        let hadamard = Spacing::Samples(hadamard_factors(self.samples));
+        let [allan, hadamard] = [
+            curve(Deviation::Allan, allan),
+            curve(Deviation::Hadamard, hadamard),
+        ];
         self.model = estimator.fit(&allan, &hadamard);
-        self.read_white_band(without_lines.dt_s(), options.confidence);
+        self.read_white_band(integrated.dt_s(), options.confidence);
     }
 
-    /// Takes N from the spectrum if the Allan curve is bent at its short end, where the model shows N wrongly or not at all.
+    /// Takes N from the spectrum, without its lines, if it has any or the Allan curve is bent at its short end: there the model shows N wrongly or not at all.
     fn read_white_band(&mut self, dt_s: f64, confidence: f64) {
         let Some(model) = &mut self.model else { return };
-        // The slopes of a bump remain: below twice the floor, but they move the whole curve.
-        let bump = self.spectrum.lines.iter().any(|l| l.width_hz.is_some());
         let shortened = model.range_s[0] > 1.5 * dt_s;
-        if model.get(Term::N).is_ok() && model.excess.is_none() && !shortened && !bump {
+        if model.get(Term::N).is_ok()
+            && model.excess.is_none()
+            && !shortened
+            && self.spectrum.lines.is_empty()
+        {
             return;
         }
         let Some(white) = self.spectrum.white_band(dt_s, confidence) else {
@@ -496,7 +434,7 @@ impl Channel {
     /// Warns if the long end of the curve shows a drift, and adds the Hadamard deviation, which cancels a drift.
     fn judge_drift(
         &mut self,
-        hadamard: impl FnOnce() -> Vec<Point>,
+        integrated: &Integrated,
         heat: Option<(f64, f64)>,
         options: &Options,
         warnings: &mut Vec<Warning>,
@@ -520,7 +458,8 @@ impl Channel {
             warning: Box::new(warning),
         });
         if options.kind != Deviation::Hadamard {
-            self.hadamard = Some(hadamard());
+            let times = Spacing::PerDecade(options.per_decade);
+            self.hadamard = Some(integrated.curve(Deviation::Hadamard, &times, options.confidence));
         }
     }
 }

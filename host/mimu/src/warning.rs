@@ -501,11 +501,9 @@ pub enum Warning {
         "{effect} of the calibration is missing in the new one, because the {sensor} was not recorded"
     )]
     EffectLost { effect: String, sensor: Sensor },
-    /// Lines of the spectrum that are not steady.
-    #[error(
-        "unsteady lines were removed, and the spectrum still exceeds its floor: the coefficients contain part of that"
-    )]
-    UnsteadyLines,
+    /// Frequencies of the lines of a spectrum, Hz.
+    #[error("lines of the spectrum at {} Hz are not noise of the sensor, and B, K, Q and R contain what they add to the curve: record where the source (a building, a fan, the mains) does not reach", hz.iter().map(|f| significant(*f)).collect::<Vec<_>>().join(", "))]
+    Lines { hz: Vec<f64> },
     /// Range of the temperature that a channel follows, °C, and the correlation.
     #[error("follows temp_c, which changes by {} °C (correlation {correlation:.2}): the long end of its curve shows temperature, not the sensor's noise", significant(*.span_c))]
     FollowsChamber { span_c: f64, correlation: f64 },

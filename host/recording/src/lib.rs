@@ -11,6 +11,7 @@ pub mod error;
 pub mod health;
 pub mod result_file;
 pub mod signed_low_byte;
+pub mod statistics;
 pub mod units;
 
 mod batch;

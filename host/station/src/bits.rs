@@ -1,8 +1,5 @@
 //! Bits of the codes that never change, and runs of equal readings.
 
-use mimu::signal::quantisation_step::QuantisationFinder;
-use mimu_recording::health::channel_run_by_chance;
-
 /// Largest distance of a reading from a whole code, in codes: text files and scales round the last digits.
 const WHOLE: f64 = 0.05;
 /// Share of the readings in which a bit has to differ from the rest to count as changing. A single spike that crosses a power of two changes high bits
@@ -10,18 +7,10 @@ const WHOLE: f64 = 0.05;
 const CHANGES: f64 = 0.01;
 /// Fewer readings do not show which bits change.
 const FEWEST: usize = 200;
-/// Samples of a block in which the share of equal neighbours is counted.
-const BLOCK: usize = 100;
 
-/// The codes behind `readings`, whose quantisation step is `lsb` if it is known. `None` if they are not multiples of a step.
-///
-/// Without a known step the smallest one that shows is taken, and a stuck lowest bit cannot be seen.
-pub fn codes(readings: &[f64], lsb: Option<f64>) -> Option<Vec<i64>> {
-    let step = lsb.or_else(|| {
-        let mut finder = QuantisationFinder::default();
-        readings.chunks(BLOCK).for_each(|block| finder.push(block));
-        finder.find()
-    })?;
+/// The codes behind `readings` with this quantisation step; `None` if they are not multiples of it. If the step was found in the readings, a stuck lowest bit cannot
+/// be seen.
+pub fn codes(readings: &[f64], step: f64) -> Option<Vec<i64>> {
     let code = |reading: &f64| {
         let code = reading / step;
         ((code - code.round()).abs() < WHOLE).then_some(code.round() as i64)
@@ -44,43 +33,20 @@ pub fn stuck_bits(codes: &[i64]) -> Option<u32> {
     Some((0..highest).filter(|b| rarer(*b) == 0).count() as u32)
 }
 
-/// The longest run of equal readings, and the longest that chance explains: `None` where most neighbours are equal, as of a converter coarser than the
-/// noise.
-pub fn equal_run(readings: &[f64]) -> (usize, Option<f64>) {
-    let (mut longest, mut run) = (1, 1);
-    for pair in readings.windows(2) {
-        run = if pair[0] == pair[1] { run + 1 } else { 1 };
-        longest = longest.max(run);
-    }
-    let equal = |block: &[f64]| {
-        let pairs = block.windows(2);
-        let equal = pairs.clone().filter(|p| p[0] == p[1]).count();
-        equal as f64 / pairs.count().max(1) as f64
-    };
-    // The median block shows the working channel, even if it is stuck for a part of the time.
-    let mut shares: Vec<f64> = readings.chunks(BLOCK).map(equal).collect();
-    shares.sort_by(f64::total_cmp);
-    let share = shares.get(shares.len() / 2).copied().unwrap_or(1.0);
-    (longest, channel_run_by_chance(share, readings.len() as u64))
+/// The longest run of equal readings.
+pub fn equal_run(readings: &[f64]) -> usize {
+    let runs = readings.chunk_by(|a, b| a == b).map(<[f64]>::len);
+    runs.max().unwrap_or(0)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// Codes about `level` with noise of `sigma` codes: sums of twelve uniform numbers.
+    /// Codes about `level` with noise of `sigma` codes.
     fn noisy(level: f64, sigma: f64, seed: u64) -> Vec<i64> {
-        let mut state = seed;
-        let mut uniform = || {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1);
-            (state >> 11) as f64 / (1u64 << 53) as f64
-        };
-        let code = |_| {
-            let normal = (0..12).map(|_| uniform()).sum::<f64>() - 6.0;
-            (level + sigma * normal).round() as i64
-        };
+        let mut random = mimu_rig::random::Random::new(seed, "bits");
+        let code = |_| (level + sigma * random.normal()).round() as i64;
         (0..2000).map(code).collect()
     }
 
@@ -119,26 +85,20 @@ mod tests {
     fn codes_are_found_behind_a_scale() {
         let raw = noisy(120.0, 5.0, 3);
         let scaled: Vec<f64> = raw.iter().map(|c| *c as f64 / 16.4).collect();
-        assert_eq!(codes(&scaled, Some(1.0 / 16.4)), Some(raw.clone()));
-        assert_eq!(codes(&scaled, None), Some(raw));
+        assert_eq!(codes(&scaled, 1.0 / 16.4), Some(raw));
         let none: Vec<f64> = scaled
             .iter()
             .enumerate()
             .map(|(k, v)| v + (k as f64).sin())
             .collect();
-        assert_eq!(codes(&none, Some(1.0 / 16.4)), None);
+        assert_eq!(codes(&none, 1.0 / 16.4), None);
     }
 
     #[test]
-    fn a_channel_that_sticks_has_a_run_beyond_chance() {
+    fn the_longest_run_is_that_of_a_channel_that_sticks() {
         let mut readings: Vec<f64> = noisy(0.0, 2.0, 4).iter().map(|c| *c as f64).collect();
-        let (run, limit) = equal_run(&readings);
-        assert!((run as f64) < limit.unwrap(), "{run} {limit:?}");
+        assert!(equal_run(&readings) < 10);
         readings[500..800].fill(3.0);
-        let (run, limit) = equal_run(&readings);
-        assert!(
-            run >= 300 && (run as f64) > limit.unwrap(),
-            "{run} {limit:?}"
-        );
+        assert!((300..310).contains(&equal_run(&readings)));
     }
 }

@@ -10,6 +10,7 @@ use std::path::Path;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::read_text;
 use mimu_recording::result_file::stage;
+use mimu_recording::statistics::mean_and_variance;
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
@@ -167,12 +168,7 @@ fn is_judged(measured: &Measured) -> bool {
 /// The prediction interval of one more value: `t · s √(1 + 1/n)`, with the larger of the scatter between the sessions and the noise within them.
 fn compared(today: &Measured, reference: &[&GoldenValue], tests: usize) -> Moved {
     let n = reference.len() as f64;
-    let mean = reference.iter().map(|v| v.value).sum::<f64>() / n;
-    let between = reference
-        .iter()
-        .map(|v| (v.value - mean).powi(2))
-        .sum::<f64>()
-        / (n - 1.0);
+    let (mean, between) = mean_and_variance(reference.iter().map(|v| v.value));
     let within = reference
         .iter()
         .map(|v| v.repeatability.powi(2))
@@ -193,16 +189,10 @@ fn compared(today: &Measured, reference: &[&GoldenValue], tests: usize) -> Moved
 mod tests {
     use super::*;
 
-    /// A normal number with standard deviation 1, by Box and Muller.
+    /// Normal numbers with standard deviation 1.
     fn normals(seed: u64) -> impl FnMut() -> f64 {
-        let mut state = seed;
-        let mut uniform = move || {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1);
-            ((state >> 11) as f64 + 0.5) / (1u64 << 53) as f64
-        };
-        move || (-2.0 * uniform().ln()).sqrt() * (std::f64::consts::TAU * uniform()).cos()
+        let mut random = mimu_rig::random::Random::new(seed, "golden");
+        move || random.normal()
     }
 
     /// A session whose quantities scatter by 1 between sessions, measured with 0.1, and are `off` the first ones.

@@ -1,6 +1,7 @@
 //! Noise of a channel at rest: rms, and density in a band.
 
-use realfft::RealFftPlanner;
+use mimu_allan::spectrum::density_in;
+use mimu_recording::statistics::Line;
 
 /// A figure with its standard uncertainty.
 pub type WithSigma = (f64, f64);
@@ -35,83 +36,31 @@ pub fn rms(readings: &[f64]) -> WithSigma {
 
 /// `readings` minus their straight line by least squares.
 fn about_line(readings: &[f64]) -> Vec<f64> {
-    let n = readings.len() as f64;
-    let middle = 0.5 * (n - 1.0);
-    let mean = readings.iter().map(|v| v - readings[0]).sum::<f64>() / n + readings[0];
-    let slope = (0..)
-        .zip(readings)
-        .map(|(k, v)| (f64::from(k) - middle) * (v - mean))
-        .sum::<f64>()
-        / (n * (n * n - 1.0) / 12.0);
-    let line = |k: i32| mean + slope * (f64::from(k) - middle);
-    (0..).zip(readings).map(|(k, v)| v - line(k)).collect()
+    let points = || (0..).zip(readings).map(|(k, v)| [f64::from(k), *v]);
+    let line = Line::through(points());
+    let rest = |[k, v]: [f64; 2]| v - line.map_or(v, |line| line.at(k));
+    points().map(rest).collect()
 }
 
 /// Band whose mean density is reported, Hz. Data sheets state the density at 10 Hz.
 pub const BAND_HZ: [f64; 2] = [5.0, 20.0];
 /// The band ends at this share of the sample rate: beyond, filters and aliasing change the density.
 const HIGHEST: f64 = 0.4;
-/// Sine tapers.
-const TAPERS: usize = 4;
-/// Fewest frequencies in the band.
-const FEWEST: usize = 16;
 
 /// One-sided density of the noise of `readings`, which are `dt_s` apart: root mean square over [`BAND_HZ`], unit/√Hz, with its standard uncertainty. `None`
 /// if the record or its rate does not reach so far.
-///
-/// Mean of periodograms behind orthogonal sine tapers (Riedel and Sidorenko 1995), which keep vibration and drift outside the band from leaking into it.
-/// With `v` the mean of the squared tapers, the variance of the mean over a band W of a record T is `n Σ v² / (W T)` of its square.
 pub fn density(readings: &[f64], dt_s: f64) -> Option<WithSigma> {
-    let n = readings.len();
-    let df = 1.0 / (n as f64 * dt_s);
-    let top = BAND_HZ[1].min(HIGHEST / dt_s);
-    let (first, last) = (
-        (BAND_HZ[0] / df).ceil() as usize,
-        (top / df).floor() as usize,
-    );
-    if last < first + FEWEST {
-        return None;
-    }
-    let rest = about_line(readings);
-    let transform = RealFftPlanner::new().plan_fft_forward(n);
-    let (mut input, mut output) = (transform.make_input_vec(), transform.make_output_vec());
-    let mut squares = vec![0.0; n];
-    let mut power = 0.0;
-    for taper in 1..=TAPERS {
-        let step = std::f64::consts::PI * taper as f64 / (n as f64 + 1.0);
-        for (k, (to, value)) in input.iter_mut().zip(&rest).enumerate() {
-            let weight = (2.0 / (n as f64 + 1.0)).sqrt() * (step * (k as f64 + 1.0)).sin();
-            squares[k] += weight * weight / TAPERS as f64;
-            *to = weight * value;
-        }
-        // Fails only for buffers of the wrong length.
-        let _ = transform.process(&mut input, &mut output);
-        power += output[first..=last]
-            .iter()
-            .map(|bin| bin.norm_sqr())
-            .sum::<f64>();
-    }
-    let bins = (last - first + 1) as f64;
-    let density = (2.0 * dt_s * power / (bins * TAPERS as f64)).sqrt();
-    let spread = n as f64 * squares.iter().map(|v| v * v).sum::<f64>() / bins;
-    Some((density, 0.5 * density * spread.sqrt()))
+    density_in(readings, dt_s, [BAND_HZ[0], BAND_HZ[1].min(HIGHEST / dt_s)])
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// White noise of standard deviation 1 by Marsaglia's xorshift and twelve uniform numbers.
+    /// White noise of standard deviation 1.
     fn white(n: usize, seed: u64) -> Vec<f64> {
-        let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
-        let mut uniform = || {
-            state ^= state << 13;
-            state ^= state >> 7;
-            state ^= state << 17;
-            (state >> 11) as f64 / (1u64 << 53) as f64
-        };
-        let normal = |_| (0..12).map(|_| uniform()).sum::<f64>() - 6.0;
-        (0..n).map(normal).collect()
+        let mut random = mimu_rig::random::Random::new(seed, "white");
+        (0..n).map(|_| random.normal()).collect()
     }
 
     /// Share of `figures` within two of their standard uncertainties of `truth`.

@@ -4,7 +4,7 @@ use mimu::quantity::Sensor;
 use mimu::readable::STANDARD_GRAVITY;
 use mimu_device::Verdict;
 use mimu_recording::error::Result;
-use mimu_recording::health::{Constant, is_coarse};
+use mimu_recording::health::is_coarse;
 use nalgebra::Vector3;
 
 use crate::bits::{codes, equal_run, stuck_bits};
@@ -188,37 +188,35 @@ impl Quantities {
         let of = |c: usize| &samples.batch.raw[c][rest.rows.clone()];
         for (axis, c) in sensor.channels().enumerate() {
             let readings = of(c);
-            match codes(readings, lsb).map(|codes| stuck_bits(&codes)) {
+            let step = lsb.or(rest.step[c]);
+            match step
+                .and_then(|step| codes(readings, step))
+                .map(|codes| stuck_bits(&codes))
+            {
                 Some(Some(count)) => self.add(of_bits, Some((sensor, axis)), count.into(), 0.0),
                 Some(None) => self.missing(of_bits, Some(axis), "the codes do not change"),
                 None => self.missing(of_bits, Some(axis), "the readings are no whole codes"),
             }
-            let (run, mut by_chance) = equal_run(readings);
-            let dead = Constant::of(readings.iter().copied())
-                .found(c, readings.len() as u64)
-                .is_some();
-            if dead {
-                let coarse = sensor.channels().filter(|o| *o != c).any(|o| {
-                    let step = lsb.unwrap_or(0.0);
-                    is_coarse(rms(of(o)).0.powi(2), step)
-                });
+            let (run, mut by_chance) = (equal_run(readings), rest.longest_run[c]);
+            if run == readings.len() {
+                let mut others = sensor.channels().filter(|o| *o != c);
+                let coarse =
+                    lsb.is_some_and(|step| others.any(|o| is_coarse(rms(of(o)).0.powi(2), step)));
                 if coarse {
                     let why = "its value never changes: it is dead, or its steps are coarser than its noise";
                     self.missing(of_run, Some(axis), why);
                     continue;
                 }
-                by_chance = sensor
-                    .channels()
-                    .filter_map(|o| equal_run(of(o)).1)
-                    .reduce(f64::max)
-                    .or(Some(readings.len() as f64 - 1.0));
+                let others = sensor.channels().map(|o| rest.longest_run[o]);
+                let longest = others.filter(|run| run.is_finite()).reduce(f64::max);
+                by_chance = longest.unwrap_or(readings.len() as f64 - 1.0);
             }
             self.add(of_run, Some((sensor, axis)), run as f64, 0.0);
-            if let Some(limit) = by_chance {
+            if by_chance.is_finite() {
                 self.own_limits.push(OwnLimit {
                     name: of_run.name(Some(axis)),
                     lower: None,
-                    upper: Some(limit),
+                    upper: Some(by_chance),
                     source: "longest run that chance explains".into(),
                 });
             }

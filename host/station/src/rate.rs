@@ -1,6 +1,7 @@
 //! Sample rate and lost samples, by the time stamps.
 
 use mimu_recording::error::Result;
+use mimu_recording::statistics::Line;
 use mimu_recording::usual_rate_hz;
 
 /// What the time stamps say.
@@ -34,7 +35,9 @@ impl Rate {
                 count += ((pair[1] - pair[0]) / period).round().max(1.0);
                 points.push([count, pair[1] - t_s[0]]);
             }
-            (period, sigma) = line(&points);
+            if let Some(line) = Line::through(points.iter().copied()) {
+                (period, sigma) = (line.slope, line.sigma);
+            }
         }
         let hz = 1.0 / period;
         Ok(Self {
@@ -51,20 +54,6 @@ impl Rate {
         let share = self.lost as f64 / all;
         (100.0 * share, 100.0 * (share * (1.0 - share) / all).sqrt())
     }
-}
-
-/// Slope of a straight line through `points`, and its standard deviation by their scatter.
-fn line(points: &[[f64; 2]]) -> (f64, f64) {
-    let n = points.len() as f64;
-    let [x, y] = [0, 1].map(|i| points.iter().map(|p| p[i]).sum::<f64>() / n);
-    let squares = points.iter().map(|p| (p[0] - x).powi(2)).sum::<f64>();
-    let products = points.iter().map(|p| (p[0] - x) * (p[1] - y));
-    let slope = products.sum::<f64>() / squares;
-    let rest = points
-        .iter()
-        .map(|p| (p[1] - y - slope * (p[0] - x)).powi(2));
-    let variance = rest.sum::<f64>() / (n - 2.0).max(1.0);
-    (slope, (variance / squares).sqrt())
 }
 
 #[cfg(test)]

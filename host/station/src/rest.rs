@@ -36,6 +36,10 @@ pub struct Rest {
     pub variance: [f64; 6],
     /// Its length without lost samples, s.
     pub duration_s: f64,
+    /// Quantisation steps that the readings show, raw.
+    pub step: [Option<f64>; 6],
+    /// Longest runs of equal readings that chance explains; infinite where most neighbours are equal, as of a converter coarser than the noise.
+    pub longest_run: [f64; 6],
 }
 
 impl Rest {
@@ -87,6 +91,8 @@ impl Rest {
             mean: dwell.raw.map(|mean| mean.mean),
             variance: [0, 1, 2, 3, 4, 5].map(variance),
             duration_s: dwell.duration_s,
+            step: condensed.quantisation_step,
+            longest_run: dwells.longest_run,
         };
         match turned(dwell, &condensed, scale) {
             Some(angle) if samples.has(Sensor::Accel as usize) => Err(moved(format!(

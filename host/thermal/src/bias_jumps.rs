@@ -1,5 +1,6 @@
 //! Jumps of a gyro's bias while the unit does not move: the stress in a die relaxes. No row is left out for them.
 
+use mimu_recording::statistics::OF_MEDIAN;
 use mimu_recording::units::median;
 use nalgebra::Vector3;
 
@@ -11,8 +12,6 @@ const LEVEL_ROWS: usize = 4;
 const JUMP_SIGMAS: f64 = 10.0;
 /// larger than the change by the trend from one level to the other, because trends bend.
 const JUMP_TRENDS: f64 = 1.0;
-/// From a median absolute deviation to a standard deviation.
-const OF_MEDIAN: f64 = 1.4826;
 
 /// A jump of the bias.
 #[derive(Debug, Clone, Copy, PartialEq)]

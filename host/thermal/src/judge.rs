@@ -4,6 +4,7 @@
 use std::cmp::Ordering;
 
 use mimu::quantity::Sensor;
+use mimu_recording::statistics::root_mean_square;
 use nalgebra::Vector3;
 use serde::{Serialize, Serializer};
 
@@ -243,7 +244,7 @@ pub fn hysteresis(errors: &[DwellError], curves: &TriadCurves) -> Option<Vec<Hys
             .iter()
             .max_by(|a, b| a.1[k].abs().total_cmp(&b.1[k].abs()))?;
         let variance: f64 = bins.iter().map(|b| b.2).sum();
-        let rms = (bins.iter().map(|b| b.1[k].powi(2)).sum::<f64>() / n).sqrt();
+        let rms = root_mean_square(bins.iter().map(|b| b.1[k]));
         let seen = change[k].abs() > SLOPE_SIGMAS * covariance[(k, k)].max(0.0).sqrt();
         let by_kelvin = change[k].abs() / (to - from) / model.matrix.row(k).norm();
         Some(Hysteresis {

@@ -1,4 +1,4 @@
-//! The running integral of a series of rates, slice by slice.
+//! The running integral of a series of rates.
 
 use rayon::prelude::*;
 
@@ -8,8 +8,6 @@ use crate::spectrum::sum_over;
 
 /// Number of samples that are summed separately before they are added to the integral.
 const CHUNK: usize = 4096;
-/// Number of samples of a longer slice that are integrated at a time.
-const SLICE: usize = 1 << 16;
 
 /// A series integrated over time, ready for differences of any length.
 ///
@@ -19,38 +17,20 @@ const SLICE: usize = 1 << 16;
 pub struct Integrated {
     /// Integral at the sample borders: one more than there are rates.
     x: Vec<f64>,
-    /// Mean of the first slice of rates; it need only be near the mean of all.
-    reference: Option<f64>,
-    end: Sum,
     dt_s: f64,
     sampling: Sampling,
 }
 
 impl Integrated {
-    /// Without rates yet; they will be `dt_s` apart.
-    pub fn empty(dt_s: f64) -> Self {
-        Self {
-            x: vec![0.0],
-            reference: None,
-            end: Sum::default(),
-            dt_s,
-            sampling: Sampling::Instants,
-        }
-    }
-
     /// Integrates rates (any unit) that are `dt_s` apart, in place: three hours at 1 kHz take 86 MB only once.
     ///
     /// # Errors
     /// The first rate that is not a finite number.
     pub fn new(mut rates: Vec<f64>, dt_s: f64) -> Result<Self, NotFinite> {
-        let mut integrated = Self::empty(dt_s);
-        if rates.is_empty() {
-            return Ok(integrated);
-        }
-        integrated.refuse_not_finite(&rates)?;
+        refuse_not_finite(&rates)?;
         let reference = mean(&rates);
+        let mut end = Sum::default();
         let sums = chunk_sums(&rates, reference);
-        let end = &mut integrated.end;
         let starts: Vec<f64> = sums.into_iter().map(|part| end.add(part)).collect();
         let last = end.add(0.0);
         rates
@@ -67,41 +47,11 @@ impl Integrated {
         // Exactly one more than the rates; a vector that grows automatically would double.
         rates.reserve_exact(1);
         rates.push(last);
-        integrated.x = rates;
-        integrated.reference = Some(reference);
-        Ok(integrated)
-    }
-
-    /// Integrates the next rates (any unit). Long slices are best: 1e4 samples keep the processor busy.
-    ///
-    /// # Errors
-    /// The first rate that is not a finite number; then nothing of the slice is integrated.
-    pub fn push(&mut self, rates: &[f64]) -> Result<(), NotFinite> {
-        self.refuse_not_finite(rates)?;
-        let reference = match self.reference {
-            Some(reference) => reference,
-            None if rates.is_empty() => return Ok(()),
-            None => *self.reference.insert(mean(rates)),
-        };
-        self.x.reserve(rates.len());
-        for rates in rates.chunks(SLICE) {
-            let sums = chunk_sums(rates, reference);
-            let starts: Vec<f64> = sums.into_iter().map(|part| self.end.add(part)).collect();
-            let before = self.x.len();
-            self.x.resize(before + rates.len(), 0.0);
-            self.x[before..]
-                .par_chunks_mut(CHUNK)
-                .zip(rates.par_chunks(CHUNK))
-                .zip(starts)
-                .for_each(|((x, rates), start)| {
-                    let mut since_start = 0.0;
-                    for (x, rate) in x.iter_mut().zip(rates) {
-                        since_start += rate - reference;
-                        *x = start + since_start;
-                    }
-                });
-        }
-        Ok(())
+        Ok(Self {
+            x: rates,
+            dt_s,
+            sampling: Sampling::Instants,
+        })
     }
 
     /// Takes a series that is an integral already (rad, m/s, s), sampled every `dt_s`.
@@ -109,14 +59,12 @@ impl Integrated {
     /// # Errors
     /// The first sample that is not a finite number.
     pub fn of_phase(phase: &[f64], dt_s: f64) -> Result<Self, NotFinite> {
-        let mut integrated = Self {
-            x: Vec::new(),
+        refuse_not_finite(phase)?;
+        Ok(Self {
+            x: phase.to_vec(),
+            dt_s,
             sampling: Sampling::Means,
-            ..Self::empty(dt_s)
-        };
-        integrated.refuse_not_finite(phase)?;
-        integrated.x.extend_from_slice(phase);
-        Ok(integrated)
+        })
     }
 
     /// The integral.
@@ -147,25 +95,22 @@ impl Integrated {
             Sampling::Means => self.dt_s,
         }
     }
+}
 
-    fn refuse_not_finite(&self, next: &[f64]) -> Result<(), NotFinite> {
-        // A chunk at a time and without leaving it early, for the vector unit.
-        let sound = |chunk: &[f64]| chunk.iter().fold(true, |ok, v| ok & v.is_finite());
-        let Some(chunk) = next.chunks(CHUNK).position(|c| !sound(c)) else {
-            return Ok(());
-        };
-        let not_finite = |v: &f64| !v.is_finite();
-        let at = chunk * CHUNK
-            + next[chunk * CHUNK..]
-                .iter()
-                .position(not_finite)
-                .unwrap_or(0);
-        let before = self.x.len().saturating_sub(1);
+fn refuse_not_finite(rates: &[f64]) -> Result<(), NotFinite> {
+    // A chunk at a time and without leaving it early, for the vector unit.
+    let sound = |chunk: &[f64]| chunk.iter().fold(true, |ok, v| ok & v.is_finite());
+    let Some(chunk) = rates.chunks(CHUNK).position(|c| !sound(c)) else {
+        return Ok(());
+    };
+    let mut from = (chunk * CHUNK..).zip(&rates[chunk * CHUNK..]);
+    let bad = from.find(|(_, v)| !v.is_finite());
+    bad.map_or(Ok(()), |(sample, value)| {
         Err(NotFinite {
-            sample: before + at,
-            value: next[at],
+            sample,
+            value: *value,
         })
-    }
+    })
 }
 
 /// The mean of `rates`, with a rounding error of parts in 1e12.

@@ -171,25 +171,25 @@ fn graded(mut kinks: Vec<i64>, end: i64) -> Vec<i64> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::differences::Order::{self, Second, Third};
     use super::*;
+    use crate::Deviation;
 
-    fn over(order: Order, m: usize) -> Differences {
-        Differences { order, m }
+    fn over(kind: Deviation, m: usize) -> Differences {
+        Differences { kind, m }
     }
 
     fn edf(m: usize, n: usize, process: usize) -> f64 {
         let mut a = [0.0; PROCESSES];
         a[process] = 1.0;
-        let mean = over(Second, m).basis()[process];
-        2.0 * mean * mean / Covariances::new(vec![over(Second, m)], n).of(0, 0, &a, 0.0)
+        let mean = over(Deviation::Allan, m).basis()[process];
+        2.0 * mean * mean / Covariances::new(vec![over(Deviation::Allan, m)], n).of(0, 0, &a, 0.0)
     }
 
     #[test]
     fn each_process_has_the_variance_of_its_power_law() {
-        for order in [Second, Third] {
+        for kind in [Deviation::Allan, Deviation::Hadamard] {
             for m in [1, 3, 8, 1000] {
-                let d = over(order, m);
+                let d = over(kind, m);
                 for (c, known) in cross(d, d, 0).iter().zip(d.basis()) {
                     assert!((c / known - 1.0).abs() < 1e-9, "{d:?}: {c} {known}");
                 }
@@ -201,15 +201,18 @@ mod tests {
     fn graded_lags_sum_to_what_all_lags_sum_to() {
         let n = 1500;
         for (i, j) in [
-            (over(Second, 1), over(Second, 1)),
-            (over(Second, 64), over(Second, 1)),
-            (over(Second, 32), over(Second, 16)),
-            (over(Third, 40), over(Second, 300)),
-            (over(Third, 125), over(Second, 8)),
-            (over(Third, 33), over(Third, 200)),
-            (over(Third, 200), over(Second, 750)),
-            (over(Second, 750), over(Second, 750)),
-            (over(Second, 256), over(Second, 256)),
+            (over(Deviation::Allan, 1), over(Deviation::Allan, 1)),
+            (over(Deviation::Allan, 64), over(Deviation::Allan, 1)),
+            (over(Deviation::Allan, 32), over(Deviation::Allan, 16)),
+            (over(Deviation::Hadamard, 40), over(Deviation::Allan, 300)),
+            (over(Deviation::Hadamard, 125), over(Deviation::Allan, 8)),
+            (
+                over(Deviation::Hadamard, 33),
+                over(Deviation::Hadamard, 200),
+            ),
+            (over(Deviation::Hadamard, 200), over(Deviation::Allan, 750)),
+            (over(Deviation::Allan, 750), over(Deviation::Allan, 750)),
+            (over(Deviation::Allan, 256), over(Deviation::Allan, 256)),
         ] {
             let graded = Pair::new(i, j, n);
             let mut sums = [0.0; PROCESSES];

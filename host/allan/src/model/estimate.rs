@@ -5,7 +5,8 @@ use std::ops::Range;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::covariance::{Covariances, PROCESSES};
-use super::differences::{Differences, Order, PHASE, RAMP, TERMS};
+use super::differences::{Differences, PHASE, RAMP, TERMS};
+use crate::Deviation;
 
 /// Least relative error of the curve, whatever its degrees of freedom: a ramp without noise has infinitely many.
 const NUMERICS: f64 = 1e-7;
@@ -72,7 +73,7 @@ impl Curve<'_> {
 
     /// How many of the points are of the Allan curve.
     pub fn allan_points(&self) -> usize {
-        let allan = |d: &&Differences| d.order == Order::Second;
+        let allan = |d: &&Differences| d.kind == Deviation::Allan;
         self.points().iter().filter(allan).count()
     }
 

@@ -5,11 +5,11 @@ use std::sync::OnceLock;
 use statrs::distribution::{ContinuousCDF, Normal};
 
 use super::covariance::Covariances;
-use super::differences::{Differences, Order};
+use super::differences::Differences;
 use super::estimate::Curve;
 use super::selection::{FEWEST, SEEN, Selection};
 use super::terms::{Coefficient, NoiseModel, Reason, Term, Unseen};
-use crate::Point;
+use crate::{Deviation, Point};
 
 /// Ratio of third to second differences that are only rounding errors.
 const ROUNDING: f64 = 1e-6;
@@ -54,12 +54,12 @@ fn octaves(samples: usize) -> impl Iterator<Item = usize> {
 
 /// Points that a model is fitted to, the longest of each curve first.
 pub(super) fn points(samples: usize) -> Vec<Differences> {
-    let over = |order| move |m| Differences { order, m };
+    let over = |kind| move |m| Differences { kind, m };
     let third = hadamard_factors(samples).into_iter().rev();
     let second = allan_factors(samples).into_iter().rev();
     third
-        .map(over(Order::Third))
-        .chain(second.map(over(Order::Second)))
+        .map(over(Deviation::Hadamard))
+        .chain(second.map(over(Deviation::Allan)))
         .collect()
 }
 
@@ -91,13 +91,13 @@ impl Estimator {
         };
         for (index, point) in self.covariances.points().iter().enumerate() {
             let second = at(allan, point.m)?;
-            let deviation = match point.order {
-                Order::Second => second,
-                Order::Third => at(hadamard, point.m)?,
+            let deviation = match point.kind {
+                Deviation::Hadamard => at(hadamard, point.m)?,
+                Deviation::Allan | Deviation::Modified => second,
             };
-            match point.order {
+            match point.kind {
                 // The third differences of a ramp without noise are rounding errors.
-                Order::Third if !(deviation > ROUNDING * second) => {
+                Deviation::Hadamard if !(deviation > ROUNDING * second) => {
                     whole.y.clear();
                     whole.range.start = index + 1;
                 }

@@ -2,18 +2,18 @@
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::differences::{PHASE, RAMP, TERMS, basis};
+use super::differences::{PHASE, RAMP, TERMS};
 use super::estimate::{Curve, Fitted};
 use super::terms::Term;
+use crate::Deviation;
+use crate::gamma::TERM_DEVIANCE;
 
 /// Sigmas at which a coefficient is shown.
 pub(super) const SEEN: f64 = 3.0;
 
-/// A term must lower the deviance by this to be in the model: 2.8 standard deviations, 0.5 %.
-const TERM_DEVIANCE: f64 = 8.0;
 /// Models whose deviance, with [`TERM_DEVIANCE`] for each term, is within this of the best are plausible (an additional term with a
 /// significance between 10 % and 0.5 %): the intervals include theirs. If one of them replaces a term by another, the term is not reported.
-const PLAUSIBLE: f64 = 5.3;
+pub(crate) const PLAUSIBLE: f64 = 5.3;
 /// The same for models that replace a ramp: a random walk too weak to be seen drifts as far by chance. Of 1000 in white noise 46 were
 /// reported as ramps with [`PLAUSIBLE`], and 25 with this.
 const RAMP_PLAUSIBLE: f64 = 8.0;
@@ -128,7 +128,7 @@ impl<'a> Selection<'a> {
     /// Whether the curve, whose shortest point was (`m`, `y`), falls below white noise there as behind a low-pass filter.
     pub fn filtered(&self, (m, y): (f64, f64)) -> bool {
         let a = &self.best().a;
-        let others = basis(m).into_iter().zip(a).enumerate();
+        let others = Deviation::Allan.basis(m).into_iter().zip(a).enumerate();
         let expected: f64 = others
             .filter(|(k, _)| *k != PHASE)
             .map(|(_, (basis, a))| basis * a)

@@ -1,6 +1,7 @@
 //! The terms of the model and what was found of each.
 
-use super::differences::{RAMP, TERMS, basis};
+use super::differences::{RAMP, TERMS};
+use crate::Deviation;
 
 /// Floor of a flicker noise over its coefficient, squared: `2 ln 2/π`.
 pub const FLOOR: f64 = 2.0 * std::f64::consts::LN_2 / std::f64::consts::PI;
@@ -140,7 +141,7 @@ impl NoiseModel {
 
     /// Allan deviation of the model at `tau_s`, unit of the channel. Below [`NoiseModel::range_s`] it may differ from the measurement.
     pub fn deviation(&self, tau_s: f64) -> f64 {
-        let terms = basis(tau_s / self.dt_s);
+        let terms = Deviation::Allan.basis(tau_s / self.dt_s);
         let variance: f64 = terms.iter().zip(&self.amplitudes).map(|(b, a)| b * a).sum();
         variance.max(0.0).sqrt()
     }

@@ -14,7 +14,7 @@ const FALSE_ALARM: f64 = 1e-3;
 /// significant. It would bend a curve by less than its intervals.
 const LEAST_RATIO: f64 = 2.0;
 /// The series is this many times as long as a segment of the finest resolution.
-pub(super) const FINEST: usize = 4;
+const FINEST: usize = 4;
 /// Each resolution is this many times coarser than the next finer one.
 const COARSER: usize = 8;
 /// Samples of the shortest segment.
@@ -34,7 +34,7 @@ pub(super) struct Band {
     /// The highest.
     pub peak: usize,
     /// Whether it is wider than a line is at this resolution.
-    resolved: bool,
+    pub resolved: bool,
 }
 
 /// A spectrum at one resolution with its floor.

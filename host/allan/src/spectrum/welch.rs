@@ -69,6 +69,34 @@ impl Welch {
             dof: 2.0 * k / (1.0 + 2.0 * SEGMENT_OVERLAP * (k - 1.0) / k),
         }
     }
+
+    /// Mean density over neighbouring bins, unit²/Hz, and its degrees of freedom.
+    pub fn mean(&self, bins: &[usize]) -> (f64, f64) {
+        let n = bins.len() as f64;
+        let mean = bins.iter().map(|k| self.power[*k]).sum::<f64>() / n;
+        // Segments that overlap by half share 1/6 of the variance of a band; the bins of one, less at the ends of a band.
+        let overlap = BIN_OVERLAP * (1.0 - 0.5 / n) + 2.0 / 6.0;
+        (mean, self.dof * n / overlap)
+    }
+}
+
+/// Fewest bins of a band.
+const FEWEST_IN_BAND: usize = 4;
+
+/// Root of the mean density of `rates` (any unit, `dt_s` apart) over a band of frequencies, Hz, one-sided, unit/√Hz, with its standard uncertainty. `None` if the
+/// series is too short, or its rate too low, for the band.
+///
+/// Hann windows keep vibration and drift outside the band from leaking into it.
+pub fn density_in(rates: &[f64], dt_s: f64, band_hz: [f64; 2]) -> Option<(f64, f64)> {
+    let length = fast_length(rates.len() / 2);
+    let [from, to] = band_hz.map(|hz| hz * length as f64 * dt_s);
+    let bins: Vec<usize> = (from.ceil() as usize..=to as usize).collect();
+    if bins.len() < FEWEST_IN_BAND || 2 * bins[bins.len() - 1] >= length {
+        return None;
+    }
+    let (mean, dof) = Welch::of(rates, dt_s, length).mean(&bins);
+    let density = (2.0 * mean).sqrt();
+    Some((density, 0.5 * density * (2.0 / dof).sqrt()))
 }
 
 /// A Hann window that is computed on the fly: stored, it would be as long as the longest segment.

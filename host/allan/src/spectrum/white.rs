@@ -3,12 +3,12 @@
 //! An Allan curve shows white noise where it falls as 1/√τ. Behind a slow filter, or above a strong flicker noise, it hardly does. The
 //! spectrum resolves every frequency, and is still flat in between.
 
-use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
-use super::line::Line;
-use super::search::FINEST;
-use super::welch::{BIN_OVERLAP, Welch, fast_length};
+use super::lines::Line;
+use super::welch::Welch;
+use crate::gamma::{GammaFit, MeanSquare, sets};
+use crate::model::PLAUSIBLE;
 
 /// Means of the spectrum in an octave.
 const PER_OCTAVE: f64 = 6.0;
@@ -18,13 +18,8 @@ const FEWEST_BINS: usize = 4;
 const FEWEST: usize = 10;
 /// Least number of these in which the spectrum is white.
 const FEWEST_WHITE: usize = 6;
-/// Samples of the shortest segment.
-const SHORTEST: usize = 64;
 /// If the misfit has a lower probability, the ends are left out.
 const FITS: f64 = 1e-3;
-/// Least drop in deviance for another term, and margin of the plausible models: as in the model of the Allan curve.
-const TERM_DEVIANCE: f64 = 8.0;
-const PLAUSIBLE: f64 = 5.3;
 /// Largest share of N² that a filter may remove at the upper end: up to there the square of the frequency represents it. At 0.3, N behind a
 /// filter of first order was 0.9 % too low, two thirds of its standard deviation.
 const BENT: f64 = 0.1;
@@ -52,31 +47,10 @@ pub struct White {
 struct Mean {
     from_hz: f64,
     to_hz: f64,
-    density: f64,
-    dof: f64,
-    basis: [f64; TERMS],
+    of: MeanSquare<TERMS>,
 }
 
-struct Fitted {
-    terms: Vec<usize>,
-    a: [f64; TERMS],
-    /// Variance of the white term.
-    variance: f64,
-    deviance: f64,
-}
-
-/// N of `rates` (any unit, `dt_s` apart), with an interval of probability `confidence`. The bands of `lines` are excluded, and as much on
-/// both sides of each: the remaining slopes of a bump would pass for flicker noise there. `None` if the spectrum fits such noise in no
-/// band, or is too short.
-pub fn white_band(rates: &[f64], dt_s: f64, lines: &[Line], confidence: f64) -> Option<White> {
-    let length = fast_length(rates.len() / FINEST);
-    if length < SHORTEST {
-        return None;
-    }
-    of_spectrum(&Welch::of(rates, dt_s, length), dt_s, lines, confidence)
-}
-
-/// [`white_band`] from the spectrum of a series, in segments of a [`FINEST`]th of it.
+/// As [`super::Lines::white_band`]; `welch` has the spectrum.
 pub(super) fn of_spectrum(
     welch: &Welch,
     dt_s: f64,
@@ -123,25 +97,26 @@ fn means(welch: &Welch, dt_s: f64, out: &[[f64; 2]]) -> Vec<Mean> {
         if bins.len() < FEWEST_BINS {
             continue;
         }
-        let n = bins.len() as f64;
         let mean = |of: &dyn Fn(f64) -> f64| {
             let all = bins.iter().map(|k| of(hz(*k)));
-            all.sum::<f64>() / n
+            all.sum::<f64>() / bins.len() as f64
         };
         // Quantization of an angle, differenced from sample to sample; well below the rate the square of the frequency.
         let bend = |f: f64| (std::f64::consts::PI * f * dt_s).sin().powi(2);
+        let (value, dof) = welch.mean(&bins);
         means.push(Mean {
             from_hz: (first as f64 - 0.5) * welch.df_hz,
             to_hz: (to as f64 + 0.5) * welch.df_hz,
-            density: bins.iter().map(|k| welch.power[*k]).sum::<f64>() / n,
-            // Segments that overlap by half share 1/6 of the variance of a band; the bins of one, less at the ends of a band.
-            dof: welch.dof * n / (BIN_OVERLAP * (1.0 - 0.5 / n) + 2.0 / 6.0),
-            basis: [
-                1.0,
-                mean(&|f| 1.0 / f),
-                mean(&|f| 1.0 / (f * f)),
-                mean(&bend),
-            ],
+            of: MeanSquare {
+                value,
+                dof,
+                basis: [
+                    1.0,
+                    mean(&|f| 1.0 / f),
+                    mean(&|f| 1.0 / (f * f)),
+                    mean(&bend),
+                ],
+            },
         });
     }
     means
@@ -149,40 +124,46 @@ fn means(welch: &Welch, dt_s: f64, out: &[[f64; 2]]) -> Vec<Mean> {
 
 /// The models of a part of the spectrum; `shortened`: higher frequencies were left out, and the bend remains of them.
 fn fit(means: &[Mean], shortened: bool, z: f64) -> Option<White> {
-    let mut models: Vec<Fitted> = (0..1usize << (TERMS - 1))
-        .map(|set| (0..TERMS).filter(move |k| *k == 0 || set & (1 << (k - 1)) != 0))
-        .map(Iterator::collect::<Vec<usize>>)
-        .filter(|terms| !shortened || terms.contains(&BEND))
-        .filter_map(|terms| solve(means, &terms))
+    let squares: Vec<MeanSquare<TERMS>> = means.iter().map(|m| m.of).collect();
+    let mut models: Vec<GammaFit<TERMS>> = sets(TERMS)
+        .filter(|terms| terms[0] == 0 && (!shortened || terms.contains(&BEND)))
+        .filter_map(|terms| GammaFit::of(&squares, terms))
+        // Slow terms are not negative.
+        .filter(|fitted| (1..BEND).all(|k| fitted.coefficients[k] >= 0.0))
         .collect();
-    let cost = |m: &Fitted| m.deviance + TERM_DEVIANCE * m.terms.len() as f64;
-    models.sort_by(|a, b| cost(a).total_cmp(&cost(b)));
+    models.sort_by(|a, b| a.cost().total_cmp(&b.cost()));
     let best = models.first()?;
     let dof = (means.len() - best.terms.len()) as f64;
     if ChiSquared::new(dof).map_or(0.0, |c| c.sf(best.deviance)) < FITS {
         return None;
     }
     let top = means.last()?;
-    if -best.a[BEND] * top.basis[BEND] > BENT * best.a[0] {
+    if -best.coefficients[BEND] * top.of.basis[BEND] > BENT * best.coefficients[0] {
         return None;
     }
-    let plausible =
-        |m: &&Fitted| cost(m) <= cost(best) + PLAUSIBLE && m.deviance <= best.deviance + PLAUSIBLE;
+    let plausible = |m: &&GammaFit<TERMS>| {
+        m.cost() <= best.cost() + PLAUSIBLE && m.deviance <= best.deviance + PLAUSIBLE
+    };
     let (mut lower, mut upper) = (f64::INFINITY, 0.0f64);
     for model in models.iter().filter(plausible) {
         let sigma = model.variance.sqrt();
-        lower = lower.min((model.a[0] - z * sigma).max(0.0));
-        upper = upper.max(model.a[0] + z * sigma);
+        lower = lower.min((model.coefficients[0] - z * sigma).max(0.0));
+        upper = upper.max(model.coefficients[0] + z * sigma);
     }
-    let slow = |m: &Mean| (1..BEND).map(|k| best.a[k] * m.basis[k]).sum::<f64>();
+    let slow = |m: &Mean| {
+        (1..BEND)
+            .map(|k| best.coefficients[k] * m.of.basis[k])
+            .sum::<f64>()
+    };
     let is_white = |m: &&Mean| {
-        let other = slow(m) + best.a[BEND].max(0.0) * m.basis[BEND];
-        other < best.a[0]
+        let other = slow(m) + best.coefficients[BEND].max(0.0) * m.of.basis[BEND];
+        other < best.coefficients[0]
     };
     let white: Vec<&Mean> = means.iter().filter(is_white).collect();
-    let seen =
-        lower > 0.0 && best.a[0] > SEEN * best.variance.sqrt() && white.len() >= FEWEST_WHITE;
-    let value = best.a[0].max(0.0).sqrt();
+    let seen = lower > 0.0
+        && best.coefficients[0] > SEEN * best.variance.sqrt()
+        && white.len() >= FEWEST_WHITE;
+    let value = best.coefficients[0].max(0.0).sqrt();
     Some(White {
         value,
         sigma: 0.5 * best.variance.sqrt() / value,
@@ -191,52 +172,5 @@ fn fit(means: &[Mean], shortened: bool, z: f64) -> Option<White> {
             (true, Some(first), Some(last)) => Some([first.from_hz, last.to_hz]),
             _ => None,
         },
-    })
-}
-
-/// Maximum likelihood of gamma-distributed means by iterated weights; `None` if a slow term would be negative.
-fn solve(means: &[Mean], terms: &[usize]) -> Option<Fitted> {
-    let n = means.len();
-    let mut mu: Vec<f64> = means.iter().map(|m| m.density).collect();
-    let mut a = [0.0; TERMS];
-    let mut variance = f64::NAN;
-    for _ in 0..30 {
-        if mu.iter().any(|m| !(*m > 0.0)) {
-            return None;
-        }
-        let weight = |i: usize| (0.5 * means[i].dof).sqrt() / mu[i];
-        let mut matrix =
-            DMatrix::from_fn(n, terms.len(), |i, k| means[i].basis[terms[k]] * weight(i));
-        let scale: Vec<f64> = matrix.column_iter().map(|c| c.norm()).collect();
-        for (mut column, s) in matrix.column_iter_mut().zip(&scale) {
-            column /= *s;
-        }
-        let right = DVector::from_fn(n, |i, _| means[i].density * weight(i));
-        let inverse = matrix.tr_mul(&matrix).cholesky()?.inverse();
-        let solution = &inverse * matrix.tr_mul(&right);
-        let before = a;
-        for (k, term) in terms.iter().enumerate() {
-            a[*term] = solution[k] / scale[k];
-        }
-        variance = inverse[(0, 0)] / (scale[0] * scale[0]);
-        for (mu, mean) in mu.iter_mut().zip(means) {
-            let next: f64 = a.iter().zip(&mean.basis).map(|(a, b)| a * b).sum();
-            // A step to zero or below is shortened.
-            *mu = next.max(0.1 * *mu);
-        }
-        if (a[0] - before[0]).abs() < 1e-6 * variance.sqrt() {
-            break;
-        }
-    }
-    let allowed = terms.iter().all(|k| a[*k] > 0.0 || *k == BEND || *k == 0);
-    let deviance = means.iter().zip(&mu).map(|(m, mu)| {
-        let ratio = m.density / mu;
-        m.dof * (ratio - 1.0 - ratio.ln())
-    });
-    (allowed && a[0].is_finite()).then(|| Fitted {
-        terms: terms.to_vec(),
-        a,
-        variance,
-        deviance: deviance.sum(),
     })
 }

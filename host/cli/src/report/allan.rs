@@ -111,7 +111,7 @@ fn unseen(channels: &[&ChannelResult]) -> Markup {
     }
 }
 
-/// The curve, the lines of the spectrum that were set aside, the origin of N, and why coefficients are missing.
+/// The curve, the lines of the spectrum, the origin of N, and why coefficients are missing.
 fn everything(channels: &[&ChannelResult]) -> Markup {
     let unit = &readable::noise(channels[0].unit)[0];
     let scaled = channels.iter().filter(|c| c.raw_unit == Some("SI"));
@@ -124,8 +124,8 @@ fn everything(channels: &[&ChannelResult]) -> Markup {
         ul class="lines" data-head="" {
             @for channel in channels {
                 @for line in &channel.lines { li {
-                    (channel.name) ": line removed: " (frequency(line.frequency_hz, line.resolution_hz)) " Hz, "
-                    @match line.width_hz { Some(width) => { (significant(width)) " Hz wide" }, None => "steady" }
+                    (channel.name) ": line of the spectrum: " (frequency(line.frequency_hz, line.resolution_hz)) " Hz, "
+                    @match line.width_hz { Some(width) => { (significant(width)) " Hz wide" }, None => { "narrower than " (significant(line.resolution_hz)) " Hz" } }
                     ", rms " (interval([line.rms, line.rms_interval[0], line.rms_interval[1]], &readable::noise(channel.unit)[0])) " " (readable::noise(channel.unit)[0].unit)
                     (format!(", {:.0} dB above the floor", 10.0 * line.above_floor.log10()))
                 } }
@@ -182,12 +182,6 @@ fn curve(channels: &[&ChannelResult], unit: &Readable) -> Markup {
         @let points: Vec<Option<Point>> = channels.iter().map(|c| near(decade, [&c.tau_s, &c.adev, &c.lower, &c.upper, &c.sigma_independent].map(Vec::as_slice))).collect();
         @if let Some(time_s) = points.iter().flatten().next().map(|p| p[0]) {
             (row(&format!("  {} s", significant(time_s)), &points.iter().map(|p| p.map(cell)).collect::<Vec<_>>()))
-            // Shown only if it differs.
-            (row("    without lines", &channels.iter().map(|c| {
-                let (i, _) = c.tau_s.iter().enumerate().find(|(_, t)| **t == time_s)?;
-                let [quiet, all] = [c.adev_without_lines.as_ref()?[i], c.adev[i]].map(|d| significant(d * unit.factor));
-                (quiet != all).then_some(quiet)
-            }).collect::<Vec<_>>()))
             (row("    Hadamard", &channels.iter().map(|c| {
                 let h = c.hadamard.as_ref()?;
                 near(decade, [&h.tau_s, &h.hdev, &h.lower, &h.upper, &h.sigma_independent].map(Vec::as_slice)).map(cell)

@@ -18,7 +18,7 @@ const STYLE: &str = "text{font:14px sans-serif;fill:#000}.tick{font-size:13px}.n
 path{fill:none;stroke-width:2}.grid{stroke:#e1e1e1;stroke-width:1}.axis{stroke:#000;stroke-width:1}\
 .x{stroke:#e69f00}.y{stroke:#0072b2}.z{stroke:#009e73}\
 .band{stroke:none;opacity:.2}.x.band{fill:#e69f00}.y.band{fill:#0072b2}.z.band{fill:#009e73}\
-.hadamard{stroke-dasharray:7 4}.quiet{stroke-width:1.5;stroke-dasharray:3 3}.line{stroke:#000;stroke-width:1}.model{stroke:#000;stroke-width:1;stroke-dasharray:2 3}\
+.hadamard{stroke-dasharray:7 4}.line{stroke:#000;stroke-width:1}.model{stroke:#000;stroke-width:1;stroke-dasharray:2 3}\
 circle{fill:#fff;stroke-width:2}.key{fill:#fff;opacity:.85;stroke:#c8c8c8}";
 
 /// Classes of the channels in [`STYLE`].
@@ -78,14 +78,6 @@ fn panel(result: &AllanResult, sensor: Sensor, channels: &[&ChannelResult]) -> M
             with_values(channel),
             curve(tau_s, &channel.adev),
         ));
-        let quiet = channel.adev_without_lines.iter();
-        entries.extend(quiet.map(|d| {
-            (
-                format!("{class} quiet"),
-                format!("{name}, lines removed"),
-                curve(tau_s, d),
-            )
-        }));
         let hadamard = channel.hadamard.iter();
         entries.extend(hadamard.map(|h| {
             (

@@ -1,15 +1,16 @@
 //! Restricted maximum likelihood of the variances of a study.
 
 use mimu::nalgebra::DMatrix;
+use mimu::variance_search::Search;
 
 use super::Study;
 
-/// Logarithms of variances, of standard values, between which the maximum is sought. At the lowest a variance is zero.
-pub(super) const LOWEST: f64 = -18.0;
-const HIGHEST: f64 = 5.0;
-/// Sweeps over all variances, and the change that ends them.
-const SWEEPS: usize = 100;
-const CHANGE: f64 = 1e-7;
+/// Unit of a variance in the search, of standard values: it is sought from 1e-8 to 6e3 of these.
+const UNIT: f64 = 1e-4;
+/// Smallest repeatability, a variance of standard values: the inverse of a block would have no end.
+const LEAST: f64 = 1e-12;
+/// Smallest step of the search in the logarithm of a variance.
+const FINEST: f64 = 1e-3;
 
 /// Standard values of a study.
 pub(super) struct Model<'a> {
@@ -25,11 +26,7 @@ impl Model<'_> {
     /// Minus twice the restricted log-likelihood, without constants, of variances: repeatability, units, factors, interactions.
     ///
     /// Blocks of units are inverted one by one; factors, which connect units, by the identity of Woodbury.
-    fn deviance(&self, logs: &[f64]) -> f64 {
-        let variances: Vec<f64> = logs
-            .iter()
-            .map(|l| if *l <= LOWEST { 0.0 } else { l.exp() })
-            .collect();
+    fn deviance(&self, variances: &[f64]) -> f64 {
         let sizes = self
             .study
             .factors
@@ -46,7 +43,7 @@ impl Model<'_> {
         let mut products = DMatrix::<f64>::zeros(q + 2, q + 2);
         let mut log_determinant = 0.0;
         for rows in &self.rows {
-            let Some(factor) = self.block(rows, &variances).cholesky() else {
+            let Some(factor) = self.block(rows, variances).cholesky() else {
                 return f64::INFINITY;
             };
             log_determinant += 2.0 * factor.l_dirty().diagonal().map(f64::ln).sum();
@@ -90,79 +87,36 @@ impl Model<'_> {
         DMatrix::from_fn(rows.len(), rows.len(), |i, j| {
             let same = self.cells.iter().zip(interactions);
             let same = same.filter(|(cells, _)| cells[rows[i]] == cells[rows[j]]);
-            let own = if i == j { variances[0].max(1e-12) } else { 0.0 };
+            let own = if i == j { variances[0].max(LEAST) } else { 0.0 };
             variances[1] + own + same.map(|(_, v)| v).sum::<f64>()
         })
     }
 
-    /// Logarithms of the variances with the greatest restricted likelihood, found one by one in turn.
+    /// The variances with the greatest restricted likelihood.
     pub(super) fn maximise(&self) -> Vec<f64> {
         let count = 2 + self.study.factors.len() + self.cells.len();
-        let mut logs = vec![(1.0 / count as f64).ln(); count];
-        let mut step = 2.0;
-        for _ in 0..SWEEPS {
-            let before = self.deviance(&logs);
-            let start = logs.clone();
-            for k in 0..count {
-                self.along(&mut logs, k, step);
-            }
-            let moved = logs
-                .iter()
-                .zip(&start)
-                .map(|(a, b)| (a - b).abs())
-                .fold(0.0, f64::max);
-            if before - self.deviance(&logs) < CHANGE && moved < 1e-3 {
-                break;
-            }
-            step = (2.0 * moved).clamp(1e-3, 4.0);
-        }
-        logs
-    }
-
-    /// The best value of variance `k`, by golden sections around the present one and at zero.
-    fn along(&self, logs: &mut [f64], k: usize, step: f64) {
-        let at = |log: f64, logs: &mut [f64]| {
-            logs[k] = log;
-            self.deviance(logs)
+        let variances = |values: &[f64]| values.iter().map(|v| UNIT * v).collect::<Vec<f64>>();
+        let search = Search {
+            of: |values: &[f64]| Some(-0.5 * self.deviance(&variances(values))),
+            most: vec![f64::INFINITY; count],
+            finest: FINEST,
         };
-        let present = logs[k].max(LOWEST + 1.0);
-        let [mut low, mut high] =
-            [present - step, present + step].map(|l| l.clamp(LOWEST, HIGHEST));
-        let golden = 0.5 * (5f64.sqrt() - 1.0);
-        let inner =
-            |low: f64, high: f64| [high - golden * (high - low), low + golden * (high - low)];
-        let [mut a, mut b] = inner(low, high);
-        let (mut of_a, mut of_b) = (at(a, logs), at(b, logs));
-        while high - low > 2e-5 * step.max(0.05) {
-            if of_a < of_b {
-                (high, b, of_b) = (b, a, of_a);
-                a = inner(low, high)[0];
-                of_a = at(a, logs);
-            } else {
-                (low, a, of_a) = (a, b, of_b);
-                b = inner(low, high)[1];
-                of_b = at(b, logs);
-            }
-        }
-        let best = 0.5 * (low + high);
-        let (at_best, at_zero) = (at(best, logs), at(LOWEST, logs));
-        // Repeatability is never zero: the inverse of a block would have no end.
-        logs[k] = if k > 0 && at_zero <= at_best + 1e-9 {
-            LOWEST
-        } else {
-            best
-        };
+        let start = search.fitted(vec![1.0 / (UNIT * count as f64); count]);
+        let all: Vec<usize> = (0..count).collect();
+        variances(&search.maximise(start, &all).values)
     }
 
     /// Covariance of the logarithms: the inverse of the observed information. A variance that is zero has none.
-    pub(super) fn covariance(&self, logs: &[f64]) -> DMatrix<f64> {
-        let inside: Vec<usize> = (0..logs.len()).filter(|k| logs[*k] > LOWEST).collect();
+    pub(super) fn covariance(&self, variances: &[f64]) -> DMatrix<f64> {
+        let inside: Vec<usize> = (0..variances.len())
+            .filter(|k| variances[*k] > 0.0)
+            .collect();
         let m = inside.len();
         let step = 0.05;
         let at = |moves: &[(usize, f64)]| {
-            let mut there = logs.to_vec();
+            let mut there = variances.to_vec();
             for (k, by) in moves {
-                there[inside[*k]] += by;
+                there[inside[*k]] *= by.exp();
             }
             0.5 * self.deviance(&there)
         };
@@ -175,7 +129,7 @@ impl Model<'_> {
                 (pp - pm - mp + mm) / (4.0 * step * step)
             }
         });
-        let mut out = DMatrix::zeros(logs.len(), logs.len());
+        let mut out = DMatrix::zeros(variances.len(), variances.len());
         if let Some(factor) = information.cholesky() {
             let inverse = factor.inverse();
             for (a, i) in inside.iter().enumerate() {

@@ -12,6 +12,7 @@ use crate::judgement::Judgement;
 use crate::quantity::{AXES, Sensor};
 use crate::triad::Forward;
 use mimu_recording::error::{Error, Result};
+use mimu_recording::statistics::mean_and_variance;
 use mimu_recording::{RawUnit, are_two_units};
 
 /// Probability that any parameter is named as changed although none has changed.
@@ -152,8 +153,7 @@ impl ComparedParameter {
     fn new(sensor: Sensor, name: &str, unit: &str, found: &[(f64, Option<f64>)]) -> Self {
         let values: Vec<f64> = found.iter().map(|f| f.0).collect();
         let n = values.len() as f64;
-        let mean = values.iter().sum::<f64>() / n;
-        let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0);
+        let (mean, variance) = mean_and_variance(values.iter().copied());
         let sigmas: Option<Vec<f64>> = found.iter().map(|f| f.1).collect();
         // Parameters that define the frame have no standard deviation, and are the same everywhere.
         let sigmas = sigmas.filter(|s| s.iter().all(|s| *s > 0.0));

@@ -9,6 +9,7 @@ use crate::sessions::{CommonTriad, Sessions};
 use crate::triad::Triad;
 use mimu_core::table::is_temperature;
 use mimu_recording::error::{Error, Result};
+use mimu_recording::statistics::root_mean_square;
 
 /// Sessions from which on a left-out one shows whether intervals are right.
 const LEAST_SESSIONS: usize = 3;
@@ -162,7 +163,7 @@ fn figures(sessions: &Sessions, calibration: &Calibration, sensor: Sensor) -> Op
             held.extend(with(others).map(|f| f.0));
         }
     }
-    let rms = |all: &[f64]| (all.iter().map(|x| x * x).sum::<f64>() / all.len() as f64).sqrt();
+    let rms = |all: &[f64]| root_mean_square(all.iter().copied());
     let figure = |x: f64| crate::quantity::rounded(x, super::FIGURE_DIGITS);
     Some(Judged {
         rms: figure(rms(&all)),

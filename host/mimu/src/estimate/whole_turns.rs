@@ -16,6 +16,7 @@ use crate::observation::ByTriad;
 use crate::observation::closure::{Closure, ClosureError, Closures};
 use crate::observation::turn::{Path, Turn};
 use crate::warning::Warning;
+use mimu_recording::statistics::quantile;
 
 /// Fewest turns of a whole turn: less is a turn from pose to pose.
 const FEWEST: f64 = 0.75;
@@ -285,9 +286,7 @@ fn scaled(turns: &[Turn], at_rest: &Vector3<f64>, counted: u32) -> Result<Matrix
     let scale = |axis: usize| {
         let about = |sum: &&Vector3<f64>| sum.iamax() == axis && sum.norm() > 0.5 * longest;
         let mut angles: Vec<f64> = sums.iter().filter(about).map(Vector3::norm).collect();
-        angles.sort_by(f64::total_cmp);
-        let middle = angles.get(angles.len() / 2)?;
-        Some(TAU * f64::from(counted) / middle)
+        Some(TAU * f64::from(counted) / quantile(&mut angles, 0.5)?)
     };
     let known: Vec<f64> = (0..3).filter_map(scale).collect();
     let mean = known.iter().sum::<f64>() / known.len() as f64;

@@ -6,10 +6,10 @@ use rayon::prelude::*;
 use super::closure::Closure;
 use super::component::{Cause, Component, FILTER, Kind};
 use super::likelihood::{Model, Session};
-use super::search::{Fitted, Search};
 use super::{CauseFound, Density};
 use crate::quantity::{PerSensor, Sensor, significant};
 use crate::readable::STANDARD_GRAVITY;
+use crate::variance_search::Fitted;
 
 /// Rise of the log-likelihood that a cause has to make: by chance one of the fifteen makes it in one recording of fifty.
 const RISE: f64 = 3.0;
@@ -30,11 +30,8 @@ pub(super) struct Attributed {
 
 /// The causes that the segments of `session` show, beside Allan's noise and the uncertainty of the calibration: forward selection.
 pub(super) fn of(session: &Session) -> Attributed {
-    let search = Search {
-        session,
-        counts: |_| true,
-    };
-    let mut best = search.fitted(session.known(true));
+    let search = session.search(true, |_| true);
+    let mut best = search.fitted(session.known(true).values);
     let mut included: Vec<(usize, f64)> = Vec::new();
     let mut unseen: Vec<usize> = Vec::new();
     while included.len() < MOST {
@@ -43,7 +40,7 @@ pub(super) fn of(session: &Session) -> Attributed {
             (0..session.components.len()).filter(|k| !free.contains(k) && !unseen.contains(k));
         let candidates: Vec<usize> = candidates.collect();
         let tried = candidates.into_par_iter();
-        let tried = tried.map(|k| (k, search.along(best.clone(), k, false)));
+        let tried = tried.map(|k| (k, search.along(best.clone(), k, None)));
         let mut tried: Vec<(usize, Fitted)> = tried.collect();
         tried.sort_by(|a, b| b.1.log_likelihood.total_cmp(&a.1.log_likelihood));
         // With the others fitted anew, one that was close behind may be better.
@@ -92,7 +89,7 @@ fn attributed(session: &Session, best: &Fitted, included: &[(usize, f64)]) -> At
     let mut causes: Vec<CauseFound> = included
         .iter()
         .zip(&powers)
-        .filter(|((k, _), _)| best.model.values[*k] > 0.0)
+        .filter(|((k, _), _)| best.values[*k] > 0.0)
         .map(|((k, deviance), power)| {
             let component = &session.components[*k];
             CauseFound {
@@ -100,7 +97,7 @@ fn attributed(session: &Session, best: &Fitted, included: &[(usize, f64)]) -> At
                 cause: component.cause,
                 size: match &component.kind {
                     Kind::Matrix(sensor) => matrix_error(session, best, *sensor),
-                    _ => (component.unit * best.model.values[*k]).sqrt(),
+                    _ => (component.unit * best.values[*k]).sqrt(),
                 },
                 unit: unit(component, *k),
                 deviance: *deviance,
@@ -124,7 +121,7 @@ fn attributed(session: &Session, best: &Fitted, included: &[(usize, f64)]) -> At
 
 /// Whether the error of the matrix of `sensor` is itself seen, on an element at least: where the force hardly changes, a large one and a bias are alike.
 fn is_seen(session: &Session, fitted: &Fitted, sensor: Sensor) -> bool {
-    let Some(estimated) = session.smoothed(&fitted.model) else {
+    let Some(estimated) = session.smoothed(&session.model(fitted, true)) else {
         return false;
     };
     let own = estimated.middle();
@@ -133,7 +130,7 @@ fn is_seen(session: &Session, fitted: &Fitted, sensor: Sensor) -> bool {
 
 /// The estimated relative error of the matrix of `sensor` on its worst axis: the norm of a row of `E`, where `E C` is the error of C.
 fn matrix_error(session: &Session, best: &Fitted, sensor: Sensor) -> f64 {
-    let estimated = session.smoothed(&best.model);
+    let estimated = session.smoothed(&session.model(best, true));
     let inverse = session.matrices[sensor].try_inverse();
     let (Some(estimated), Some(inverse)) = (estimated, inverse) else {
         return f64::NAN;
@@ -146,7 +143,7 @@ fn matrix_error(session: &Session, best: &Fitted, sensor: Sensor) -> f64 {
 
 /// Errors that component `k` adds, as a sum of squares over those of Allan's noise.
 fn power(session: &Session, known: &Model, best: &Fitted, k: usize) -> f64 {
-    let value = best.model.values[k];
+    let value = best.values[k];
     weighted(session, known, |closure| {
         session.unlearned(closure, k) * value
     })

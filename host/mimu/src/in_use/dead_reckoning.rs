@@ -15,26 +15,6 @@ const ERRORS: usize = 12;
 /// Time over which readings are added up before covariances follow, s: the force turns by 0.1 rad in it at 10 rad/s.
 const COARSE_S: f64 = 0.008;
 
-/// Sources of noise within a segment, each with a Gramian of its own.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Source {
-    /// White noise of both sensors as the noise file has it.
-    Known,
-    /// White noise of density 1 on every axis.
-    White(Sensor),
-    /// White noise whose variance is the mean square of the acceleration above 10 Hz.
-    Shaken(Sensor),
-}
-
-/// All of them, in the order of [`DeadReckoning::gramians`].
-pub(super) const SOURCES: [Source; 5] = [
-    Source::Known,
-    Source::White(Sensor::Gyro),
-    Source::White(Sensor::Accel),
-    Source::Shaken(Sensor::Gyro),
-    Source::Shaken(Sensor::Accel),
-];
-
 pub(super) type Errors = SMatrix<f64, ERRORS, ERRORS>;
 type ErrorsBy = SMatrix<f64, ERRORS, STATES>;
 
@@ -54,7 +34,7 @@ pub(super) struct DeadReckoning {
     pub vibration: f64,
     /// Derivatives of attitude, velocity, position and marked position by the state.
     pub by: ErrorsBy,
-    /// Covariances of the same, by [`SOURCES`].
+    /// Covariances of the same: by white noise as the noise file has it, then by the first four of [`SHARES`](super::closure::SHARES).
     pub gramians: [Errors; 5],
     /// Biases that are taken off the readings, rad/s and m/s².
     pub biases: PerSensor<Vector3<f64>>,
@@ -174,15 +154,17 @@ impl DeadReckoning {
             let mut rows = self.by.fixed_rows_mut::<3>(row);
             rows += more;
         }
-        for (source, gramian) in SOURCES.iter().zip(&mut self.gramians) {
+        let none = Matrix3::zeros();
+        let [white, shaken] = [dt, open.vibration].map(|amount| Matrix3::identity() * amount);
+        let sources = [
+            [open.known.gyro, open.known.accel],
+            [white, none],
+            [none, white],
+            [shaken, none],
+            [none, shaken],
+        ];
+        for ([gyro, accel], gramian) in sources.into_iter().zip(&mut self.gramians) {
             transported(gramian, &cross, dt);
-            let white =
-                |own: bool, amount: f64| Matrix3::identity() * if own { amount } else { 0.0 };
-            let [gyro, accel] = match source {
-                Source::Known => [open.known.gyro, open.known.accel],
-                Source::White(s) => Sensor::BOTH.map(|own| white(own == *s, dt)),
-                Source::Shaken(s) => Sensor::BOTH.map(|own| white(own == *s, open.vibration)),
-            };
             for (row, more) in [(0, gyro), (3, accel)] {
                 let mut block = gramian.fixed_view_mut::<3, 3>(row, row);
                 block += more;

@@ -30,13 +30,13 @@ pub(super) fn consistency(session: &Session) -> Consistency {
         let fitted = session.filter_densities(None, |index| half_of(index) != Some(half));
         // The reference errs alike for all: only the unit is judged.
         let mut reference = session.known(false).values;
-        reference[FILTER..OF_FILTER.end]
-            .copy_from_slice(&fitted.model.values[FILTER..OF_FILTER.end]);
+        reference[FILTER..OF_FILTER.end].copy_from_slice(&fitted.values[FILTER..OF_FILTER.end]);
         let of = |calibration| Model {
             values: reference.clone(),
             calibration,
         };
-        for (sum, model) in sums.iter_mut().zip([of(false), of(true), fitted.model]) {
+        let in_use = session.model(&fitted, false);
+        for (sum, model) in sums.iter_mut().zip([of(false), of(true), in_use]) {
             let innovations = session.innovations(&model).unwrap_or_default();
             let held = |own: &&Innovation| half_of(own.segment) == Some(half);
             for own in innovations.iter().skip(NOT_JUDGED).filter(held) {

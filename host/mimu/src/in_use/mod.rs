@@ -6,7 +6,7 @@
 //! | `rests`, `trajectory`, `trajectory_file`, `closure` | the errors against a reference: rests before and after, or a trajectory |
 //! | `linearisation`, `mounted` | the point about which the errors are linear, and the estimates there |
 //! | `allan_noise`, `component` | what is known of the noise, and the variances that the errors may have beyond it |
-//! | `likelihood`, `smoothed`, `search` | a filter over the segments, its estimates, and the most likely variances |
+//! | `likelihood`, `smoothed` | a filter over the segments, and its estimates |
 //! | `attribution`, `judged` | causes, and the errors of segments that were held out |
 
 mod allan_noise;
@@ -20,7 +20,6 @@ mod linearisation;
 mod mounted;
 mod noise_file;
 mod rests;
-mod search;
 mod smoothed;
 mod state;
 mod trajectory;
@@ -40,6 +39,7 @@ use crate::judgement::Judgement;
 use crate::noise::noise_file::NoiseFile;
 use crate::prepared::Prepared;
 use crate::quantity::{PerSensor, Sensor};
+use crate::variance_search::{Fitted, LOCAL, Search};
 use crate::warning::Warning;
 use allan_noise::AllanNoise;
 use closure::Closure;
@@ -50,7 +50,6 @@ use mimu_allan::model::Term;
 use mimu_recording::Recording;
 use mimu_recording::error::{Error, Result};
 pub use mounted::{Estimate, Mounted};
-use search::{Fitted, Search};
 use smoothed::Smoothed;
 
 /// Fewer segments show no variance.
@@ -280,7 +279,8 @@ fn linearised_where_it_settles(
         let [from, to] = [passes, passes + 1].map(share);
         let (session, left_out) = linearised(&about, &|s| progress(from + s * (to - from)))?;
         let fitted = session.filter_densities(before, |_| true);
-        let smoothed = session.smoothed(&fitted.model).ok_or_else(|| {
+        let model = session.model(&fitted, false);
+        let smoothed = session.smoothed(&model).ok_or_else(|| {
             let problem = "the errors of the segments cannot be weighed";
             Error::new(
                 "noise in use",
@@ -328,15 +328,17 @@ fn session(
         components: component::all(allan.mean_white(), has_positions, reference == "rests"),
         walks: allan.walks(apart_s.max(1e-3)),
         calibration: covariance,
-        matrices: PerSensor::from_fn(|s| {
-            calibration
-                .inverse(s)
-                .map_or_else(Matrix3::identity, |c| c.matrix)
-        }),
+        matrices: matrices(calibration),
         mounted: reference == "trajectory",
         earth_is_known: false,
         closures,
     }
+}
+
+/// C of both sensors.
+fn matrices(calibration: &Calibration) -> PerSensor<Matrix3<f64>> {
+    let of = |s| calibration.inverse(s).map(|c| c.matrix);
+    PerSensor::from_fn(|s| of(s).unwrap_or_else(Matrix3::identity))
 }
 
 /// Components that a filter has, and the reference's.
@@ -349,11 +351,38 @@ impl Session {
         all.filter(|(_, c)| c.moves).map(|(i, _)| i).collect()
     }
 
-    /// Allan's noise alone, or with the uncertainty of the calibration.
+    /// Without components: Allan's noise alone, or with the uncertainty of the calibration.
     pub(self) fn known(&self, calibration: bool) -> Model {
         Model {
             values: vec![0.0; self.components.len()],
             calibration,
+        }
+    }
+
+    /// The model of fitted components.
+    pub(self) fn model(&self, fitted: &Fitted, calibration: bool) -> Model {
+        Model {
+            values: fitted.values.clone(),
+            calibration,
+        }
+    }
+
+    /// The likelihood of components by the segments that `counts` accepts.
+    pub(self) fn search(
+        &self,
+        calibration: bool,
+        counts: impl Fn(usize) -> bool + Sync,
+    ) -> Search<impl Fn(&[f64]) -> Option<f64> + Sync> {
+        Search {
+            of: move |values: &[f64]| {
+                let model = Model {
+                    values: values.to_vec(),
+                    calibration,
+                };
+                self.log_likelihood(&model, &counts)
+            },
+            most: self.components.iter().map(|c| c.most).collect(),
+            finest: LOCAL,
         }
     }
 
@@ -363,12 +392,9 @@ impl Session {
         from: Option<Fitted>,
         counts: impl Fn(usize) -> bool + Sync,
     ) -> Fitted {
-        let search = Search {
-            session: self,
-            counts,
-        };
+        let search = self.search(false, counts);
         let free: Vec<usize> = OF_FILTER.collect();
-        let start = from.map_or_else(|| self.known(false), |own| own.model);
+        let start = from.map_or_else(|| self.known(false).values, |own| own.values);
         search.maximise(search.fitted(start), &free)
     }
 }
@@ -395,17 +421,15 @@ fn found(
     judged: &Judged,
 ) -> NoiseInUse {
     let fitted = &judged.fitted;
-    let search = Search {
-        session,
-        counts: |_| true,
-    };
+    let model = session.model(fitted, false);
+    let search = session.search(false, |_| true);
     let free: Vec<usize> = OF_FILTER.collect();
     let ranges: Vec<[f64; 2]> = (0..FILTER)
         .into_par_iter()
         .map(|k| search.range(fitted, k, &free))
         .collect();
     let attributed = attribution::of(session);
-    let densities = densities(session, &fitted.model, &ranges, allan);
+    let densities = densities(session, &model, &ranges, allan);
     let nees = judged::consistency(session);
     let moving: Vec<&Closure> = session.closures.iter().filter(|c| c.moves).collect();
     let mean = |of: &dyn Fn(&Closure) -> f64| {
@@ -425,7 +449,7 @@ fn found(
         format: "mimu-noise-in-use/1",
         tool: crate::result::TOOL,
         device: manifest.device.clone(),
-        noise_file: noise_file::of(noise, session, &fitted.model, &ranges, &judgement),
+        noise_file: noise_file::of(noise, session, &model, &ranges, &judgement),
         judgement,
         reference: judged.reference,
         segments: moving.len(),

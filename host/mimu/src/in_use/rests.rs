@@ -45,17 +45,12 @@ pub(super) fn closures(
         })
         .collect();
     let begin = |k: usize, before: &[Readings]| {
-        let rest = *before.last().unwrap_or(&Readings::default());
-        let duration_s = rest.duration_s.max(1e-9);
+        let rest = before.last().map_or(Readings::default(), Readings::mean);
         let biases = about.biases_at(0.5 * (spans[k].start_s + spans[k].end_s));
-        begun(&mean_of(&rest, duration_s), gravity, noise, biases)
+        begun(&rest, gravity, noise, biases)
     };
     let walked = walk(recording, calibration, &rests, &spans, begin, progress)?;
-    let matrices = PerSensor::from_fn(|s| {
-        calibration
-            .inverse(s)
-            .map_or_else(Matrix3::identity, |c| c.matrix)
-    });
+    let matrices = super::matrices(calibration);
     let Walked {
         rests: means,
         spans: reckoned,
@@ -86,17 +81,6 @@ pub(super) fn closures(
         }
     }
     Ok((closures, refused))
-}
-
-/// Means of the sums over a rest so far.
-fn mean_of(sum: &Readings, duration_s: f64) -> Readings {
-    Readings {
-        duration_s,
-        rate: sum.rate / duration_s,
-        force: sum.force / duration_s,
-        raw: PerSensor::from_fn(|s| sum.raw[s] / duration_s),
-        vibration: sum.vibration / duration_s,
-    }
 }
 
 /// Dead reckoning from a rest: the mean force without the `biases` points up.

@@ -12,7 +12,6 @@ use super::state::{CLOCK, GRAVITY, LEVER, MOUNTING, Readings, STATES};
 use super::trajectory_file::{Pose, Trajectory};
 use super::walk::{Span, walk};
 use crate::calibration::Calibration;
-use crate::quantity::PerSensor;
 use mimu_recording::Recording;
 use mimu_recording::error::Result;
 
@@ -47,11 +46,7 @@ pub(super) fn closures(
         DeadReckoning::new(matrix(&first.attitude), gravity, noise.squared(), biases)
     };
     let walked = walk(recording, calibration, &[], &spans, begin, progress)?;
-    let matrices = PerSensor::from_fn(|s| {
-        calibration
-            .inverse(s)
-            .map_or_else(Matrix3::identity, |c| c.matrix)
-    });
+    let matrices = super::matrices(calibration);
     let each = segments.iter().zip(&walked.spans).zip(&walked.ends);
     let mut refused = 0;
     let mut closures = Vec::new();

@@ -212,19 +212,25 @@ pub(super) fn walk(
         },
     )?;
     let mut walked = walk.walked;
-    for mean in &mut walked.rests {
-        let t = mean.duration_s;
-        if t > 0.0 {
-            mean.rate /= t;
-            mean.force /= t;
-            mean.vibration /= t;
-            mean.raw = PerSensor::from_fn(|s| mean.raw[s] / t);
-        }
+    for rest in &mut walked.rests {
+        *rest = rest.mean();
     }
     Ok(walked)
 }
 
 impl Readings {
+    /// Their mean, of sums over a time; nothing changes if that is none.
+    pub fn mean(&self) -> Self {
+        let t = if self.duration_s > 0.0 { self.duration_s } else { 1.0 };
+        Self {
+            rate: self.rate / t,
+            force: self.force / t,
+            raw: PerSensor::from_fn(|s| self.raw[s] / t),
+            vibration: self.vibration / t,
+            ..*self
+        }
+    }
+
     /// The mean of two samples that are `duration_s` apart.
     fn mean_with(&self, next: &Self, duration_s: f64) -> Self {
         Self {

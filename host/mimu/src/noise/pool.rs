@@ -4,6 +4,9 @@ use super::ChannelNoise;
 use crate::signal::blocks::{Block, Condensed};
 use crate::signal::dwell::Dwell;
 use crate::signal::ramp::ramps;
+use mimu_allan::Deviation;
+use mimu_allan::deviation::Integrated;
+use mimu_allan::gamma::{GammaFit, MeanSquare, sets};
 use mimu_allan::variance::AllanModel;
 
 /// Noise of `value` of the blocks within `dwells`.
@@ -45,88 +48,33 @@ struct Point {
     /// Number of differences that share no sample: the weight of the point.
     count: f64,
     /// Which variance.
-    kind: Differences,
+    kind: Deviation,
 }
 
-/// The differences that a variance is computed from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Differences {
-    /// Differences of two successive means, halved: the Allan variance.
-    Allan,
-    /// Second differences of three, over six: the Hadamard variance, in which a linear drift cancels.
-    Hadamard,
-}
-
-impl Differences {
-    const BOTH: [Self; 2] = [Self::Allan, Self::Hadamard];
-
-    /// Number of means in one difference.
-    fn means(self) -> usize {
-        match self {
-            Self::Allan => 2,
-            Self::Hadamard => 3,
-        }
-    }
-
-    /// This variance of white noise, flicker floor and random walk of [`AllanModel`], each with the coefficient 1.
-    ///
-    /// By Riley, Handbook of Frequency Stability Analysis (NIST SP 1065), the Hadamard variance of white noise equals the Allan variance.
-    /// For flicker noise it is ln(256/27)/2 where the Allan variance is 2 ln 2, and for a random walk half the Allan variance.
-    fn basis(self, tau_s: f64) -> [f64; 3] {
-        match self {
-            Self::Allan => [1.0 / tau_s, 1.0, tau_s],
-            Self::Hadamard => {
-                let flicker = (256.0_f64 / 27.0).ln() / (4.0 * 2.0_f64.ln());
-                [1.0 / tau_s, flicker, 0.5 * tau_s]
-            }
-        }
-    }
-
-    fn of(self, model: &AllanModel, tau_s: f64) -> f64 {
-        let [white, flicker, walk] = self.basis(tau_s);
-        model.white * white + model.flicker * flicker + model.walk * walk
-    }
-
-    /// Sum of the squared differences of means over `m` blocks, each scaled to estimate the variance, and their number; `sums` are the
-    /// cumulative sums of the series.
-    fn squares(self, sums: &[f64], m: usize) -> (f64, usize) {
-        let terms = sums.len().saturating_sub(self.means() * m);
-        let difference = |j: usize| match self {
-            Self::Allan => sums[j + 2 * m] - 2.0 * sums[j + m] + sums[j],
-            Self::Hadamard => sums[j + 3 * m] - 3.0 * (sums[j + 2 * m] - sums[j + m]) - sums[j],
-        };
-        let each = [2.0, 6.0][self as usize];
-        let sum: f64 = (0..terms)
-            .map(|j| difference(j) / m as f64)
-            .map(|d| d * d)
-            .sum();
-        (sum / each, terms)
-    }
-}
+/// The variances that are pooled: a linear drift cancels in the second.
+const KINDS: [Deviation; 2] = [Deviation::Allan, Deviation::Hadamard];
 
 /// Variances of one `kind`, by octave of the averaging time, from the series that it applies to (means over `block_s`).
-fn points(kind: Differences, all: &[Series], block_s: f64) -> Vec<Point> {
-    // Sum of squared differences, their number, and that of those which share no sample.
+fn points(kind: Deviation, all: &[Series], block_s: f64) -> Vec<Point> {
+    // Sum of the variances of all differences, their number, and that of those which share no sample.
     let mut octaves: Vec<(f64, f64, f64)> = Vec::new();
-    let of_kind = |s: &&Series| s.ramps == (kind == Differences::Hadamard);
+    let of_kind = |s: &&Series| s.ramps == (kind == Deviation::Hadamard);
     for Series { means, .. } in all.iter().filter(of_kind) {
-        let mut sums = Vec::with_capacity(means.len() + 1);
-        sums.push(0.0);
-        for m in means {
-            sums.push(sums[sums.len() - 1] + (m - means[0]));
-        }
+        let Ok(integrated) = Integrated::new(means.clone(), block_s) else {
+            continue;
+        };
         for octave in 0.. {
             let m = 1usize << octave;
-            if kind.means() * m > means.len() {
+            if kind.order() * m > means.len() {
                 break;
             }
             if octaves.len() <= octave {
                 octaves.push((0.0, 0.0, 0.0));
             }
-            let (sum, terms) = kind.squares(&sums, m);
+            let (terms, sum) = integrated.variances(kind, m);
             octaves[octave].0 += sum;
             octaves[octave].1 += terms as f64;
-            octaves[octave].2 += (means.len() / (kind.means() * m)) as f64;
+            octaves[octave].2 += (means.len() / (kind.order() * m)) as f64;
         }
     }
     octaves
@@ -145,11 +93,12 @@ fn points(kind: Differences, all: &[Series], block_s: f64) -> Vec<Point> {
 /// Noise of series of means over `block_s`, pooled.
 pub(super) fn pooled(series: impl Iterator<Item = Series>, block_s: f64) -> ChannelNoise {
     let all: Vec<Series> = series.collect();
-    let of_kinds = Differences::BOTH.map(|kind| points(kind, &all, block_s));
+    let of_kinds = KINDS.map(|kind| points(kind, &all, block_s));
     let model = fit(&of_kinds.concat());
     // A variance of n independent differences is known to √(2/n) of itself.
     let fits = |p: &Point| {
-        let expected = p.kind.of(&model, p.tau_s);
+        let [white, flicker, walk] = basis(p);
+        let expected = model.white * white + model.flicker * flicker + model.walk * walk;
         (p.variance / expected).ln().abs() <= MISFIT_SIGMAS * (2.0 / p.count).sqrt()
     };
     let misfit = of_kinds
@@ -183,86 +132,40 @@ const CURVE_DIFFERENCES: f64 = 8.0;
 /// A smaller variance is ignored: the square of its weight would overflow.
 const SMALLEST: f64 = 1e-100;
 
-/// Least drop in deviance for another term: significant at 0.5 %.
-const TERM_DEVIANCE: f64 = 8.0;
+/// A point's variance of white noise, flicker floor and random walk of [`AllanModel`], each with the coefficient 1.
+fn basis(point: &Point) -> [f64; 3] {
+    let [_, white, flicker, walk, _] = point.kind.basis(point.tau_s);
+    [white, flicker, walk]
+}
 
-/// Fits the three terms to the points, none of them negative.
-///
-/// A variance of n differences is gamma distributed, and that likelihood is maximized (iterated least squares, weighted by the model).
-/// Weights by the measured variance would let one small value from two differences outweigh a hundred. With three terms every subset can be
-/// tried. A term that does not lower the deviance by [`TERM_DEVIANCE`] is left out. With every positive term included, the noise of the
-/// curve alone made the means of white noise a tenth too noisy (errors of 0.88 sigma instead of 1).
+/// Fits the three terms to the points, none of them negative. A term that does not lower the deviance enough is left out.
 fn fit(points: &[Point]) -> AllanModel {
-    let points: Vec<_> = points.iter().filter(|p| p.variance > SMALLEST).collect();
-    let mut best = (f64::INFINITY, AllanModel::default());
-    for subset in 1..8usize {
-        let terms: Vec<usize> = (0..3).filter(|k| subset & (1 << k) != 0).collect();
-        if terms.len() > points.len() {
-            continue;
+    let points = points.iter().filter(|p| p.variance > SMALLEST);
+    let squares: Vec<MeanSquare<3>> = points
+        .map(|p| MeanSquare {
+            value: p.variance,
+            dof: p.count,
+            basis: basis(p),
+        })
+        .collect();
+    let best = sets(3)
+        .filter_map(|terms| GammaFit::of(&squares, terms))
+        .filter(|fitted| fitted.terms.iter().all(|k| fitted.coefficients[*k] > 0.0))
+        .min_by(|a, b| a.cost().total_cmp(&b.cost()));
+    best.map_or_else(AllanModel::default, |best| {
+        let [white, flicker, walk] = best.coefficients;
+        AllanModel {
+            white,
+            flicker,
+            walk,
         }
-        let a = nalgebra::DMatrix::from_fn(points.len(), terms.len(), |i, j| {
-            points[i].kind.basis(points[i].tau_s)[terms[j]]
-        });
-        let y = nalgebra::DVector::from_fn(points.len(), |i, _| points[i].variance);
-        let mut model = y.clone();
-        let mut x = nalgebra::DVector::zeros(terms.len());
-        for _ in 0..50 {
-            let weights = nalgebra::DVector::from_fn(points.len(), |i, _| {
-                (0.5 * points[i].count).sqrt() / model[i]
-            });
-            let mut weighted = a.clone();
-            for (mut row, w) in weighted.row_iter_mut().zip(weights.iter()) {
-                row *= *w;
-            }
-            // Columns differ by the square of the longest time; without scaling the smallest would be lost.
-            let scale: Vec<f64> = weighted.column_iter().map(|c| c.norm()).collect();
-            for (mut column, s) in weighted.column_iter_mut().zip(&scale) {
-                column /= *s;
-            }
-            let Ok(scaled) = weighted
-                .svd(true, true)
-                .solve(&y.component_mul(&weights), 1e-12)
-            else {
-                break;
-            };
-            let next = nalgebra::DVector::from_fn(terms.len(), |j, _| scaled[j] / scale[j]);
-            let done = (&next - &x).amax() <= 1e-9 * next.amax();
-            x = next;
-            model = (&a * &x).zip_map(&y, |m, v| m.max(1e-3 * v));
-            if done {
-                break;
-            }
-        }
-        if x.iter().any(|v| !(*v > 0.0)) {
-            continue;
-        }
-        let deviance: f64 = points
-            .iter()
-            .zip(model.iter())
-            .map(|(p, m)| p.count * (p.variance / m - 1.0 - (p.variance / m).ln()))
-            .sum();
-        let cost = deviance + TERM_DEVIANCE * terms.len() as f64;
-        if cost < best.0 {
-            let mut coefficients = [0.0; 3];
-            for (k, v) in terms.iter().zip(x.iter()) {
-                coefficients[*k] = *v;
-            }
-            let [white, flicker, walk] = coefficients;
-            best = (
-                cost,
-                AllanModel {
-                    white,
-                    flicker,
-                    walk,
-                },
-            );
-        }
-    }
-    best.1
+    })
 }
 
 #[cfg(test)]
 mod tests {
+    use mimu_rig::random::Random;
+
     use super::*;
 
     #[test]
@@ -278,7 +181,7 @@ mod tests {
                 tau_s: t,
                 variance: truth.variance(t),
                 count: 1e4,
-                kind: Differences::Allan,
+                kind: Deviation::Allan,
             })
             .collect();
         let found = fit(&points);
@@ -299,7 +202,7 @@ mod tests {
                 tau_s: t,
                 variance: 4e-6 / t,
                 count: 10.0,
-                kind: Differences::Allan,
+                kind: Deviation::Allan,
             })
             .collect();
         let found = fit(&points);
@@ -307,14 +210,6 @@ mod tests {
             (found.white / 4e-6 - 1.0).abs() < 1e-9 && found.variance(100.0) < 4.1e-8,
             "{found:?}"
         );
-    }
-
-    /// Uniformly distributed over an interval of length 1, mean 0.
-    fn uniform(state: &mut u64) -> f64 {
-        *state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (*state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
     }
 
     fn series(
@@ -333,8 +228,8 @@ mod tests {
     #[test]
     fn an_even_drift_is_no_noise_where_the_temperature_ramps() {
         let found = |ramps: bool, slope: f64| {
-            let mut state = 7;
-            let mut next = || uniform(&mut state);
+            let mut random = Random::new(7, "pool");
+            let mut next = || random.uniform() - 0.5;
             pooled(series(ramps, 50, &mut next, slope).into_iter(), 0.1)
         };
         let still = found(true, 0.0);
@@ -353,10 +248,10 @@ mod tests {
     #[test]
     fn a_random_walk_has_the_same_size_by_both_variances() {
         let found = |ramps: bool| {
-            let mut state = 11;
+            let mut random = Random::new(11, "pool");
             let mut at = 0.0;
             let mut next = || {
-                at += uniform(&mut state);
+                at += random.uniform() - 0.5;
                 at
             };
             pooled(series(ramps, 200, &mut next, 0.0).into_iter(), 1.0).model

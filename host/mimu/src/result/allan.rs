@@ -122,11 +122,9 @@ pub struct ChannelResult {
     pub longer_s: BTreeMap<String, f64>,
     /// Lowest and highest frequency that was searched for lines, Hz; null for a record too short for a spectrum.
     pub searched_hz: Option<[f64; 2]>,
-    /// Lines and bumps of the spectrum, by frequency. The coefficients describe the noise without them.
+    /// Lines and bumps of the spectrum, by frequency. [`Self::n`] then comes from the spectrum without them, and the other coefficients contain what they
+    /// add to the curve.
     pub lines: Vec<LineResult>,
-    /// Deviations without them, at [`Self::tau_s`]; absent where there are none.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub adev_without_lines: Option<Vec<f64>>,
     /// Band in which the spectrum is white, Hz, if N was read from the spectrum; null if it was read from the curve.
     pub n_band_hz: Option<[f64; 2]>,
     /// Hadamard deviation; absent unless there is a drift that requires it.
@@ -139,10 +137,9 @@ pub struct ChannelResult {
 pub struct LineResult {
     /// Frequency, Hz.
     pub frequency_hz: f64,
-    /// Band with the middle half of its power, Hz; null for a steady sinusoid, which is narrower than the record
-    /// resolves.
+    /// Band with the middle half of its power, Hz; null for a line narrower than [`Self::resolution_hz`].
     pub width_hz: Option<f64>,
-    /// Rms, [`ChannelResult::unit`]; that of a bump within [`Self::band_hz`].
+    /// Rms within [`Self::band_hz`], [`ChannelResult::unit`].
     pub rms: f64,
     /// Ends of the interval of the rms.
     pub rms_interval: [f64; 2],
@@ -150,7 +147,7 @@ pub struct LineResult {
     pub above_floor: f64,
     /// Noise bandwidth of the spectrum in which it has this density, Hz.
     pub resolution_hz: f64,
-    /// Band that was excluded for it, Hz.
+    /// Band in which it exceeds the floor, Hz.
     pub band_hz: [f64; 2],
 }
 
@@ -254,7 +251,6 @@ impl ChannelResult {
     fn of(survey: &Survey, channel: &Channel) -> Self {
         let column = |of: fn(&Point) -> f64| column(&channel.curve, of);
         let model = channel.model.as_ref();
-        let without_lines = channel.without_lines.as_deref();
         let (mut reasons, mut at_most) = (BTreeMap::new(), BTreeMap::new());
         let mut longer_s = BTreeMap::new();
         let [q, n, b, k, r] = Term::ALL.map(|term| {
@@ -317,7 +313,6 @@ impl ChannelResult {
             longer_s,
             searched_hz: channel.spectrum.searched_hz,
             lines: channel.spectrum.lines.iter().map(LineResult::of).collect(),
-            adev_without_lines: without_lines.map(|curve| self::column(curve, |p| p.deviation)),
             n_band_hz: channel.n_band_hz,
             hadamard: channel.hadamard.as_deref().map(HadamardResult::of),
         }

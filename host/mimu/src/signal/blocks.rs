@@ -14,6 +14,7 @@ pub use crate::signal::moments::{Moments, Rails};
 use crate::signal::quantisation_step::QuantisationFinder;
 use crate::warning::Warning;
 use mimu_recording::error::{Argument, Error, Result};
+pub(crate) use mimu_recording::statistics::{OF_MEDIAN, quantile};
 use mimu_recording::health::{At, Finding, HeldReadings, SignedLowByteFinder, Temperatures};
 use mimu_recording::{Batch, Column, RAW_COLUMNS, Recording};
 
@@ -579,9 +580,6 @@ impl Condenser {
     }
 }
 
-/// Standard deviation of normal deviations over the median of their magnitudes.
-pub(crate) const OF_MEDIAN: f64 = 1.4826;
-
 /// The lowest and the highest of `values`; the infinities, the higher one first, without any.
 pub fn extent(values: impl Iterator<Item = f64>) -> [f64; 2] {
     values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| {
@@ -591,12 +589,3 @@ pub fn extent(values: impl Iterator<Item = f64>) -> [f64; 2] {
 
 /// A range of blocks, with its step if that is given.
 pub(crate) type StepBlocks = (Option<i32>, std::ops::Range<usize>);
-
-/// The `share` quantile; reorders `values`.
-pub(crate) fn quantile(values: &mut [f64], share: f64) -> Option<f64> {
-    if values.is_empty() {
-        return None;
-    }
-    let at = ((values.len() - 1) as f64 * share).round() as usize;
-    Some(*values.select_nth_unstable_by(at, f64::total_cmp).1)
-}

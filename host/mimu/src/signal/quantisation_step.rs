@@ -105,13 +105,8 @@ mod tests {
 
     fn step(reading: impl Fn(f64) -> f64) -> Option<f64> {
         let mut finder = QuantisationFinder::default();
-        let mut seed = 1u64;
-        let mut uniform = || {
-            seed = seed
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            (seed >> 11) as f64 / (1u64 << 53) as f64
-        };
+        let mut random = mimu_rig::random::Random::new(1, "quantisation");
+        let mut uniform = || random.uniform();
         for block in 0..3000 {
             let level = 1.1 + 7e-4 * f64::from(block);
             let samples: Vec<f64> = (0..10)

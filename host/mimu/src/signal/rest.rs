@@ -7,6 +7,7 @@ use std::ops::Range;
 
 use crate::quantity::Sensor;
 use crate::signal::blocks::{Condensed, OF_MEDIAN, StepBlocks, pool, quantile};
+use mimu_recording::statistics::root_mean_square;
 
 /// Number of blocks whose mean is compared with that of the middle: the noise of a single block would hide a slow turn.
 const GROUP: usize = 3;
@@ -105,8 +106,7 @@ pub(crate) fn walk_in(
                 continue;
             };
             let [at_first, at_last] = [0, 1].map(|end| {
-                let squares = own[end].iter().map(|d| d * d).sum::<f64>();
-                let rms = (squares / own[end].len() as f64).sqrt();
+                let rms = root_mean_square(own[end].iter().copied());
                 (
                     mean(condensed, middles[end].clone(), c),
                     at_ends * pooled.max(rms),

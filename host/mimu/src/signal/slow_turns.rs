@@ -194,26 +194,14 @@ impl Fit {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use mimu_rig::random::Random;
 
-    /// Normal deviates: sums of twelve uniform ones from a linear congruential generator.
-    fn normal(seed: u64) -> impl FnMut() -> f64 {
-        let mut state = seed;
-        move || {
-            let mut sum = -6.0;
-            for _ in 0..12 {
-                state = state
-                    .wrapping_mul(6_364_136_223_846_793_005)
-                    .wrapping_add(1_442_695_040_888_963_407);
-                sum += (state >> 11) as f64 / (1_u64 << 53) as f64;
-            }
-            sum
-        }
-    }
+    use super::*;
 
     /// Twenty-two poses: biases in counts with noise of 1, g-sensitivity of 20 counts, and the turns given, in counts.
     fn session(seed: u64, turns: &[(usize, f64)]) -> Vec<Reading> {
-        let mut random = normal(seed);
+        let mut noise = Random::new(seed, "slow turns");
+        let mut random = || noise.normal();
         let by_force: [f64; 9] = std::array::from_fn(|_| 20.0 * random());
         let each = |k: usize| {
             let force: [f64; 3] = std::array::from_fn(|_| random());

@@ -13,6 +13,7 @@ use crate::signal::rate_at_rest::RateAtRest;
 use crate::signal::window::{Window, in_bursts, windows};
 use mimu_recording::error::{Error, Result};
 use mimu_recording::health;
+use mimu_recording::statistics::mean_and_variance;
 use mimu_recording::{Manifest, Reference};
 
 /// Length of the window whose variance decides on stillness, s. It is long enough for a slow turn to show in the accelerometer: the force
@@ -325,10 +326,8 @@ impl Search<'_> {
         let blocks = &self.condensed.blocks;
         let inner = range.start + most..range.end - most;
         let usual = |c: usize| {
-            let means = || blocks[inner.clone()].iter().map(|b| b.raw[c].mean);
-            let n = inner.len() as f64;
-            let mean = means().sum::<f64>() / n;
-            let square = means().map(|m| (m - mean).powi(2)).sum::<f64>() / (n - 1.0);
+            let means = blocks[inner.clone()].iter().map(|b| b.raw[c].mean);
+            let (mean, square) = mean_and_variance(means);
             (c, mean, square)
         };
         let usual: Vec<_> = self.channels.iter().map(|c| usual(*c)).collect();

@@ -42,6 +42,5 @@ fn normals(random: &mut SplitMix) -> [f64; 2] {
 
 /// Median; infinite values count as the largest.
 pub(super) fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+    mimu_recording::statistics::quantile(&mut values, 0.5).unwrap_or(f64::NAN)
 }

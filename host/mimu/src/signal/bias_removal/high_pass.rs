@@ -12,6 +12,7 @@ use super::GUARD;
 use crate::bias_removal::HighPass;
 use crate::signal::blocks::{Block, Condensed};
 use crate::triad::half_width_95;
+use mimu_recording::statistics::mean_and_variance;
 
 /// Fewest rests.
 const FEWEST: usize = 6;
@@ -156,7 +157,7 @@ impl HighPass {
             return None;
         }
         let of_shown = || shows.iter().map(|k| slopes[*k].value);
-        let slope = of_shown().sum::<f64>() / shows.len() as f64;
+        let (slope, scatter) = mean_and_variance(of_shown());
         let near = |other: f64| (other / slope - 1.0).abs() < AGREE;
         let (decay, sigma) = within(&all, &shows);
         let decays = decay < -SEEN * sigma && (near(decay) || (decay - slope).abs() < 4.0 * sigma);
@@ -164,7 +165,6 @@ impl HighPass {
             return None;
         }
         let count = shows.len() as f64;
-        let scatter = of_shown().map(|s| (s - slope).powi(2)).sum::<f64>() / (count - 1.0);
         let known = shows.iter().map(|k| slopes[*k].sigma.powi(2)).sum::<f64>() / count;
         // Axes differ by what their noise left in the integral, which the scatter about the lines does not contain.
         let by_axes = half_width_95([(scatter / count, count - 1.0)].into_iter());

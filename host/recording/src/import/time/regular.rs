@@ -10,6 +10,7 @@
 use super::gap::{Gap, Jitter, STALL_S, quantile};
 use super::grid::{self, SAMPLED, Steps};
 use super::polled::{self, Rounds};
+use crate::statistics::OF_MEDIAN;
 
 /// An interval longer than this many periods may hide missing samples.
 const LONG: f64 = 1.25;
@@ -490,7 +491,7 @@ impl Lateness<'_> {
         let mut all: Vec<f64> = (1..places).step_by(stride).map(differ).collect();
         match all.is_empty() {
             true => 0.0,
-            false => 1.4826 * quantile(&mut all, 0.5),
+            false => OF_MEDIAN * quantile(&mut all, 0.5),
         }
     }
 }

@@ -1,91 +1,101 @@
-//! The most likely variances, and the ranges that the likelihood leaves them.
-
-use super::likelihood::{Model, Session};
+//! The most likely variances of independent components, and the ranges that the likelihood leaves them: one search for every model, each with its own likelihood.
+//!
+//! A variance is zero or a logarithm on [`RANGE`]; the likelihood is maximised along one of them after the other.
 
 /// Logarithms of a value between which it is searched, in its unit.
 const RANGE: [f64; 2] = [-9.0, 18.0];
 /// Coordinates are searched in turn until a round gains less than this in log-likelihood.
 const GAIN: f64 = 0.01;
-const ROUNDS: usize = 10;
+const ROUNDS: usize = 9;
+/// Each search with smaller steps has steps this much smaller.
+const FINER: f64 = 0.25;
 /// Half of the 95 % quantile of chi-square of one degree of freedom; and of a variance that is 0 in truth, whose deviance is 0 in every other
 /// recording (Self and Liang 1987).
 const HALF_DEVIANCE: f64 = 1.920_729;
 const HALF_DEVIANCE_AT_0: f64 = 1.352_772;
+/// Rounds and gain of a search that need only tell likely from unlikely.
+const NEARLY: (usize, f64) = (4, 0.1);
 /// Steps of a search over the whole range, and the step of a local one.
 const COARSE: u32 = 12;
-const LOCAL: f64 = 0.5;
+pub const LOCAL: f64 = 0.5;
 
-/// A model with its log-likelihood.
+/// Variances with their log-likelihood.
 #[derive(Debug, Clone)]
-pub(super) struct Fitted {
-    pub model: Model,
+pub struct Fitted {
+    /// Variances, each in its unit.
+    pub values: Vec<f64>,
+    /// Logarithm of the likelihood, without constants.
     pub log_likelihood: f64,
 }
 
-/// Fits variances of a session to the segments that `counts` accepts.
-pub(super) struct Search<'a, F: Fn(usize) -> bool + Sync> {
-    pub session: &'a Session,
-    pub counts: F,
+/// A likelihood of variances.
+pub struct Search<F: Fn(&[f64]) -> Option<f64> + Sync> {
+    /// Its logarithm, without constants; `None` where a covariance is singular.
+    pub of: F,
+    /// Largest value of each variance, in its unit.
+    pub most: Vec<f64>,
+    /// Smallest step in the logarithm of a variance: from [`LOCAL`] on, a maximum is known to a small part of its range.
+    pub finest: f64,
 }
 
-impl<F: Fn(usize) -> bool + Sync> Search<'_, F> {
-    fn at(&self, model: &Model) -> f64 {
-        let value = self.session.log_likelihood(model, &self.counts);
-        value.unwrap_or(f64::NEG_INFINITY)
-    }
-
-    /// The likelihood of `model` as it is.
-    pub fn fitted(&self, model: Model) -> Fitted {
-        let log_likelihood = self.at(&model);
+impl<F: Fn(&[f64]) -> Option<f64> + Sync> Search<F> {
+    /// The likelihood of `values`.
+    pub fn fitted(&self, values: Vec<f64>) -> Fitted {
         Fitted {
-            model,
-            log_likelihood,
+            log_likelihood: (self.of)(&values).unwrap_or(f64::NEG_INFINITY),
+            values,
         }
     }
 
     /// The most likely values of `free`, from those of `start`.
     pub fn maximise(&self, start: Fitted, free: &[usize]) -> Fitted {
-        let mut best = start;
-        for round in 0..ROUNDS {
+        let before = start.log_likelihood;
+        let mut best = free
+            .iter()
+            .fold(start, |best, k| self.along(best, *k, None));
+        let mut step = match best.log_likelihood - before < GAIN {
+            true => FINER * LOCAL,
+            false => LOCAL,
+        };
+        while step >= self.finest {
+            let gain = GAIN * (step / LOCAL).powi(2);
+            best = self.ascend(best, free, step, (ROUNDS, gain));
+            step *= FINER;
+        }
+        best
+    }
+
+    /// Searches near the present values by `step`, in at most so many rounds, until one gains less than the least.
+    fn ascend(
+        &self,
+        mut best: Fitted,
+        free: &[usize],
+        step: f64,
+        (rounds, least): (usize, f64),
+    ) -> Fitted {
+        for _ in 0..rounds {
             let before = best.log_likelihood;
-            for &k in free {
-                best = self.along(best, k, round > 0);
-            }
-            if best.log_likelihood - before < GAIN {
+            best = free
+                .iter()
+                .fold(best, |best, k| self.along(best, *k, Some(step)));
+            if best.log_likelihood - before < least {
                 break;
             }
         }
         best
     }
 
-    /// The same, searched only near `start`.
-    fn maximise_near(&self, start: Fitted, free: &[usize]) -> Fitted {
-        let mut best = start;
-        for _ in 0..4 {
-            let before = best.log_likelihood;
-            for &k in free {
-                best = self.along(best, k, true);
-            }
-            if best.log_likelihood - before < 0.1 {
-                break;
-            }
-        }
-        best
-    }
-
-    /// The most likely value of component `k`, with the others as they are; if `near`, only around the present one, unless that is 0.
-    pub fn along(&self, mut best: Fitted, k: usize, near: bool) -> Fitted {
-        let now = best.model.values[k];
-        let near = (near && now > 0.0).then(|| now.ln());
+    /// The most likely value of variance `k`, with the given others; with a step `near`, only so far around the present one, unless that is 0.
+    pub fn along(&self, mut best: Fitted, k: usize, near: Option<f64>) -> Fitted {
+        let now = best.values[k];
+        let near = near.filter(|_| now > 0.0).map(|step| (now.ln(), step));
         let mut try_value = |value: f64| {
-            let mut model = best.model.clone();
-            model.values[k] = value.min(self.session.components[k].most);
-            let log_likelihood = self.at(&model);
+            let mut values = best.values.clone();
+            values[k] = value.min(self.most[k]);
+            let tried = self.fitted(values);
+            let log_likelihood = tried.log_likelihood;
             if log_likelihood > best.log_likelihood {
-                best = Fitted {
-                    model,
-                    log_likelihood,
-                };
+                best = tried;
             }
             log_likelihood
         };
@@ -94,18 +104,18 @@ impl<F: Fn(usize) -> bool + Sync> Search<'_, F> {
         best
     }
 
-    /// The 95 % range of component `k`: the values whose likelihood, with `free` fitted to each, is near the largest.
+    /// The 95 % range of variance `k`: the values whose likelihood, with `free` fitted to each, is near the largest.
     pub fn range(&self, best: &Fitted, k: usize, free: &[usize]) -> [f64; 2] {
         let others: Vec<usize> = free.iter().copied().filter(|j| *j != k).collect();
         let fall = |value: f64| {
-            let mut model = best.model.clone();
-            model.values[k] = value;
-            let profile = self.maximise_near(self.fitted(model), &others);
+            let mut values = best.values.clone();
+            values[k] = value;
+            let profile = self.ascend(self.fitted(values), &others, LOCAL, NEARLY);
             best.log_likelihood - profile.log_likelihood
         };
         let falls = |value: f64| fall(value) > HALF_DEVIANCE;
-        let middle = best.model.values[k].max(RANGE[0].exp());
-        let lower = match best.model.values[k] <= RANGE[0].exp() || fall(0.0) < HALF_DEVIANCE_AT_0 {
+        let middle = best.values[k].max(RANGE[0].exp());
+        let lower = match best.values[k] <= RANGE[0].exp() || fall(0.0) < HALF_DEVIANCE_AT_0 {
             true => 0.0,
             false => edge(RANGE[0], middle.ln(), |v| !falls(v)),
         };
@@ -140,10 +150,10 @@ fn edge(outside: f64, inside: f64, likely: impl Fn(f64) -> bool) -> f64 {
 /// Looks for the largest of `of` over logarithms: coarsely over [`RANGE`], then by parabolas about the best, or only about `near`.
 ///
 /// A likelihood is nearly a parabola of the logarithm of a variance, so golden sections would need four times as many evaluations.
-fn look_for_best(of: &mut impl FnMut(f64) -> f64, near: Option<f64>) {
-    if let Some(near) = near {
+fn look_for_best(of: &mut impl FnMut(f64) -> f64, near: Option<(f64, f64)>) {
+    if let Some((near, step)) = near {
         let at = of(near.exp());
-        vertex(of, (near, at), LOCAL);
+        vertex(of, (near, at), step);
         return;
     }
     let step = (RANGE[1] - RANGE[0]) / f64::from(COARSE);
