@@ -89,16 +89,6 @@ fn models(fit: &Fit) -> [Option<Affine<f64>>; 2] {
     Sensor::BOTH.map(|s| Some(fit.sensor(s)?.estimated.triad.inverse))
 }
 
-/// The figure of a row, and how many rows count as one error.
-fn figure(observable: Observable) -> (Figure, f64) {
-    match observable {
-        Observable::Turns => (Figure::Direction, 2.0),
-        Observable::WholeTurns => (Figure::Direction, 1.0),
-        Observable::Magnitude => (Figure::GravityMagnitude, 1.0),
-        _ => (Figure::Input, 1.0),
-    }
-}
-
 /// Residuals with the biases fitted, at these components.
 fn left(rows: &Rows, at: &Components) -> Option<DVector<f64>> {
     let model = basis(&rows.nuisance);
@@ -141,10 +131,10 @@ fn changes(both: [&Rows; 2], recording: &str) -> Option<Vec<Change>> {
             without
                 .strata
                 .iter()
-                .filter(move |s| figure(s.name.0).0 == kind)
+                .filter(move |s| s.name.0.figure() == kind)
         };
         let errors = plain.each_ref().map(|left| {
-            let squares = |(name, r): (Observable, f64)| r * r * figure(name).1;
+            let squares = |(name, r): (Observable, f64)| r * r * name.components() as f64;
             let each = ours().flat_map(|s| s.rows.clone().map(|r| (s.name.0, left[r])));
             let count = ours().map(|s| s.rows.len()).sum::<usize>() as f64;
             ErrorRms {

@@ -15,13 +15,13 @@ use super::as_written::AsWritten;
 use super::decision::{Decision, decide, noisier};
 use super::note::Note;
 use super::rejected::{Reason, Rejected};
-use super::rows::{ForceErrors, FreeParameters, RowFigure, Rows, Session};
+use super::rows::{ForceErrors, FreeParameters, Rows, Session};
 use super::{Heard, singular};
 use crate::effects::fitted::FittedEffect;
 use crate::effects::removal::remove;
 use crate::fit::Fit;
 use crate::prepared::Prepared;
-use crate::quantity::Sensor;
+use crate::quantity::{Figure, Sensor};
 use mimu_recording::error::Result;
 
 /// Most times that the rows of a sensor are made.
@@ -100,13 +100,12 @@ impl Pass {
     /// Effects of the sensor's own input, about which rows are linearised if they are not linear in the readings. On a table the input is
     /// known, so there are none.
     fn about(&self) -> Vec<FittedEffect> {
-        match self.rows.figure {
-            RowFigure::Input | RowFigure::Rest => Vec::new(),
-            RowFigure::Magnitude | RowFigure::Direction => {
-                let found = self.found.iter().filter(|e| e.is_of_own_input());
-                found.cloned().collect()
-            }
-        }
+        let is_linear = self.rows.observable.figure() == Figure::Input;
+        let found = self
+            .found
+            .iter()
+            .filter(|e| !is_linear && e.is_of_own_input());
+        found.cloned().collect()
     }
 
     /// Whether `other` has the same effects, and readings without them can be calibrated. If it is linearised about the effects found here,

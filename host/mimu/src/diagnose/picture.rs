@@ -228,7 +228,7 @@ fn tracks(rows: &Rows, sample: impl Fn(usize, f64) -> Sample) -> Vec<Track> {
                 },
                 samples: of_it.iter().map(|r| sample(*r, sigma(*r))).collect(),
                 rows: of_it,
-                axis: stratum.axis,
+                axis: stratum.axis(),
                 group: stratum.name.0,
             });
         }

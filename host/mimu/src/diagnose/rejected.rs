@@ -203,7 +203,7 @@ impl ErrorRms {
     /// Of the judged `rows`.
     pub(super) fn of(rows: &Rows, rms: f64) -> Self {
         Self {
-            figure: rows.figure.into(),
+            figure: rows.observable.figure(),
             sensor: rows.sensor,
             rms,
         }

@@ -3,10 +3,11 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::diagnose::columns::unit_columns;
-use crate::diagnose::rows::{RowFigure, Rows};
+use crate::diagnose::rows::Rows;
 use crate::diagnose::search::{Chosen, Search};
 use crate::diagnose::variance::Fitted;
 use crate::fit::Split;
+use crate::observable::Observable;
 
 /// Contiguous blocks that are left out in turn.
 const BLOCKS: usize = 4;
@@ -88,7 +89,7 @@ pub(in crate::diagnose) fn held_out(
 /// Root mean square of the rows at rest, SI, if the judged rows are turns; `None` if there are none.
 pub(super) fn rms_at_rest(rows: &Rows, residuals: &DVector<f64>) -> Option<f64> {
     let count = rows.y.len() - rows.judged.0;
-    (rows.figure == RowFigure::Direction && count > 0)
+    (rows.observable == Observable::Turns && count > 0)
         .then(|| (residuals.rows(rows.judged.0, count).norm_squared() / count as f64).sqrt())
 }
 

@@ -155,7 +155,7 @@ fn of_axis(
     {
         return None;
     }
-    let of_axis = rows.strata.iter().find(|s| s.axis == Some(axis));
+    let of_axis = rows.strata.iter().find(|s| s.axis() == Some(axis));
     let stratum = of_axis.or(rows.strata.first())?;
     let squares = |m: &DMatrix<f64>, f: &Fitted| {
         let left = &rows.y - m * &f.coefficients;

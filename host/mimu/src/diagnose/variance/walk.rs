@@ -10,7 +10,7 @@
 use nalgebra::{Cholesky, DMatrix};
 
 use super::{Components, NormalEquations, VarianceModel};
-use crate::diagnose::rows::{RowFigure, Rows, Stratum};
+use crate::diagnose::rows::{Rows, Stratum};
 
 /// Most steps of a walk, of all recordings together. A walk of finer steps differs from it by less than the noise of its dwells.
 const STEPS: usize = 32;
@@ -32,7 +32,7 @@ impl CommonWalk {
     /// Of the biases of all recordings of `rows`; `None` if a walk is not to be sought: the wander is known, or the rows of each stratum alone show it.
     pub fn of(rows: &Rows) -> Option<Self> {
         let unknown = |s: &Stratum| s.random_walk.is_some() && !s.wander_known;
-        if rows.figure == RowFigure::Input || !rows.strata.iter().any(unknown) {
+        if rows.is_of_known_inputs() || !rows.strata.iter().any(unknown) {
             return None;
         }
         let spans = rows.spans();
