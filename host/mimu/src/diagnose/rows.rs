@@ -151,12 +151,6 @@ impl Stratum {
             _ => Cow::Borrowed(&self.known),
         }
     }
-
-    /// Whether its rows are independent, apart from the errors that all share and a random walk.
-    pub fn is_independent(&self) -> bool {
-        let count = self.known.nrows();
-        (0..count).all(|j| (0..count).all(|i| i == j || self.known[(i, j)] == 0.0))
-    }
 }
 
 impl<'a> Session<'a> {

@@ -138,8 +138,8 @@ pub struct SensorDiagnosisResult {
     pub dwells: usize,
     /// Why the others were not used, as a remark.
     pub not_used: String,
-    /// Data for its plots; `None` if a model is singular.
-    pub picture: Option<Picture>,
+    /// Data for its plots.
+    pub picture: Picture,
 }
 
 /// A sensor that the recordings cannot judge.

@@ -11,7 +11,7 @@
 use std::ops::Range;
 
 use mimu_core::compensation::Affine;
-use nalgebra::{DMatrix, DVector, SVector};
+use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
 use crate::calibration::Calibration;
@@ -61,61 +61,63 @@ pub struct Causes {
     pub bias_change_interval: [f64; 3],
 }
 
-/// Rows of one group of errors: a column for each of d, then for each entry of A.
+/// Rows of one group of errors: of each triad a column for each of d, then for each entry of A.
 struct Rows {
     design: DMatrix<f64>,
     errors: DVector<f64>,
     variances: DVector<f64>,
 }
 
-/// A triad with its calibration, and the columns of its d and A.
-type Columns<'a> = (Sensor, &'a Affine<f64>, fn(&ByTriad) -> Vec<f64>);
+/// Columns of a triad.
+const OF_TRIAD: usize = 12;
+
+/// Derivatives by d, then by A.
+fn d_and_a(by: &ByTriad) -> ByTriad {
+    ByTriad::from_fn(|k, _| by[(k + 9) % OF_TRIAD])
+}
 
 impl Rows {
-    fn of(rows: Vec<(Vec<f64>, f64, f64)>, columns: usize) -> Self {
-        let n = rows.len();
-        Self {
-            design: DMatrix::from_fn(n, columns, |i, j| rows[i].0[j]),
-            errors: DVector::from_fn(n, |i, _| rows[i].1),
-            variances: DVector::from_fn(n, |i, _| rows[i].2),
-        }
-    }
-
     /// Those of each group of `factors`, by what the calibrations of `triads` err by: a calibration is (1 + A) C and (1 + A) o + d of the true one.
-    fn of_groups(factors: &Factors, triads: &[Columns]) -> Vec<Self> {
-        let models: Vec<_> = triads
-            .iter()
-            .map(|(sensor, model, _)| (*sensor, *model))
-            .collect();
-        let values = factors.values(&models);
+    fn of_groups(factors: &Factors, triads: &[(Sensor, &Affine<f64>)]) -> Vec<Self> {
+        let values = factors.values(triads);
         let (at, variances) = (factors.at(&values), factors.variances(&values));
-        // A multiplies the true input: that of a known size, where the measured one contains the error, and none at rest.
-        let input = factors.list.iter().zip(factors.ranges());
-        let input = input.flat_map(|(factor, rows)| {
-            let share = match factor.kind {
+        let mut design = DMatrix::zeros(variances.len(), OF_TRIAD * triads.len());
+        for (factor, rows) in factors.list.iter().zip(factors.ranges()) {
+            // A multiplies the true input: that of a known size, where the measured one contains the error, and none at rest.
+            let input = match factor.kind {
                 Kind::Magnitude { known, .. } => known / (known + at.residuals[rows.start]),
                 Kind::Rest(..) => 0.0,
                 _ => 1.0,
             };
-            std::iter::repeat_n(share, rows.len())
-        });
-        let input: Vec<f64> = input.collect();
-        let row = |i: usize| {
-            let of_triad = |(k, (_, model, columns)): (usize, &Columns)| {
-                let by = at.jacobian.fixed_view::<1, 12>(i, 12 * k).transpose();
+            for (i, (k, (_, model))) in
+                rows.flat_map(|i| triads.iter().enumerate().map(move |t| (i, t)))
+            {
+                let first = OF_TRIAD * k;
+                let by = at.jacobian.fixed_view::<1, OF_TRIAD>(i, first).transpose();
                 let mut by = of_output(&by, model);
-                by.fixed_rows_mut::<9>(0).scale_mut(input[i]);
-                columns(&by)
-            };
-            let by: Vec<f64> = triads.iter().enumerate().flat_map(of_triad).collect();
-            (by, at.residuals[i], variances[i])
-        };
-        let group = |(_, rows): (Option<Observable>, Range<usize>)| {
-            let rows: Vec<_> = rows.map(&row).collect();
-            let columns = rows.first().map_or(0, |row| row.0.len());
-            Self::of(rows, columns)
+                by.fixed_rows_mut::<9>(0).scale_mut(input);
+                let mut own = design.fixed_view_mut::<1, OF_TRIAD>(i, first);
+                own.copy_from(&d_and_a(&by).transpose());
+            }
+        }
+        let group = |(_, rows): (Option<Observable>, Range<usize>)| Self {
+            design: design.rows_range(rows.clone()).into_owned(),
+            errors: at.residuals.rows_range(rows.clone()).into_owned(),
+            variances: DVector::from_column_slice(&variances[rows]),
         };
         factors.groups().map(group).collect()
+    }
+
+    /// The same with a column for each of these sums of columns.
+    fn by(&self, sums: &[Vec<usize>]) -> Self {
+        let design = DMatrix::from_fn(self.errors.len(), sums.len(), |i, k| {
+            sums[k].iter().map(|j| self.design[(i, *j)]).sum()
+        });
+        Self {
+            design,
+            errors: self.errors.clone(),
+            variances: self.variances.clone(),
+        }
     }
 
     fn group(&self, kept: &[usize]) -> Group {
@@ -127,25 +129,15 @@ impl Rows {
     }
 }
 
-/// Symmetric entries of A: xx, yy, zz, xy, xz, yz.
-const SYMMETRIC: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
-/// Columns of d and of the symmetric part of A.
-const OF_MAGNITUDE: usize = 9;
-/// Columns of d and of A.
-const OF_TRIAD: usize = 12;
-
-/// Derivatives by d, then by A.
-fn all(by: &ByTriad) -> Vec<f64> {
-    (9..12).chain(0..9).map(|k| by[k]).collect()
-}
-
-/// Derivatives by d and the symmetric part of A.
-fn symmetric(by: &ByTriad) -> Vec<f64> {
-    let of_a = SYMMETRIC.map(|(i, j)| match i == j {
-        true => by[4 * i],
-        false => by[3 * i + j] + by[3 * j + i],
+/// The unknowns of a triad, d and A, as sums of its columns, which begin at `from`. Magnitudes show the symmetric part of A only.
+fn unknowns(from: usize, symmetric: bool) -> [Vec<Vec<usize>>; 2] {
+    let entry = |i: usize, j: usize| from + 3 + 3 * i + j;
+    let all = (0..3).flat_map(|i| (0..3).map(move |j| (i, j)));
+    let of_a = all.filter_map(|(i, j)| match symmetric && i != j {
+        true => (i < j).then(|| vec![entry(i, j), entry(j, i)]),
+        false => Some(vec![entry(i, j)]),
     });
-    (9..12).map(|k| by[k]).chain(of_a).collect()
+    [(from..from + 3).map(|k| vec![k]).collect(), of_a.collect()]
 }
 
 /// The causes of the errors of `sensor`; `None` if the recording does not distinguish them.
@@ -156,32 +148,54 @@ pub(super) fn of(
     accel: Option<&Affine<f64>>,
 ) -> Option<Causes> {
     match (prepared.manifest.reference, sensor) {
-        (Reference::Table, _) => known(prepared, sensor, model),
+        (Reference::Table, _) => separate(&[known(prepared, sensor, model)?], &unknowns(0, false)),
         (Reference::Gravity | Reference::TurntableRate, Sensor::Accel) => {
-            separate(&by_gravity(prepared, model), &[0..3, 3..9])
+            separate(&by_gravity(prepared, model), &unknowns(0, true))
         }
-        (Reference::TurntableRate, Sensor::Gyro) => by_rate(prepared, model),
+        (Reference::TurntableRate, Sensor::Gyro) => {
+            let dwells = RatedDwells::of(prepared).ok()?;
+            let mut factors = magnitudes(&dwells, model);
+            factors.rests(&dwells.rests);
+            let rows = Rows::of_groups(&factors, &[(Sensor::Gyro, model)]);
+            separate(&rows, &unknowns(0, true))
+        }
         (Reference::Gravity, Sensor::Gyro) => {
             let rows = by_directions(prepared, model, accel?)?;
-            separate(&rows, &[0..3, 3..12, 12..21])
+            let [bias, matrix] = unknowns(0, false);
+            let of_accel = unknowns(OF_TRIAD, true).concat();
+            separate(&rows, &[bias, matrix, of_accel])
         }
     }
 }
 
-fn known(prepared: &Prepared, sensor: Sensor, model: &Affine<f64>) -> Option<Causes> {
-    separate(&[known_rows(prepared, sensor, model)?], &[0..3, 3..12])
-}
-
-fn known_rows(prepared: &Prepared, sensor: Sensor, model: &Affine<f64>) -> Option<Rows> {
-    let mut rows = Vec::new();
+/// Errors at known inputs.
+fn known(prepared: &Prepared, sensor: Sensor, model: &Affine<f64>) -> Option<Rows> {
     let forward = Forward::of(model)?;
-    for o in earth_shared::likely(&prepared.observations(sensor), &forward.matrix) {
+    let all = earth_shared::likely(&prepared.observations(sensor), &forward.matrix);
+    let n = 3 * all.len();
+    let (mut design, mut errors, mut variances) = (
+        DMatrix::zeros(n, OF_TRIAD),
+        DVector::zeros(n),
+        DVector::zeros(n),
+    );
+    for (k, o) in all.iter().enumerate() {
+        let rows = 3 * k;
         let error = vector::at(model, &o.raw, &o.input).residual;
-        let by = vector::at(&Affine::identity(), &o.input, &o.input);
+        errors.fixed_rows_mut::<3>(rows).copy_from(&error);
         let covariance = si_covariance(&model.matrix, &o.variance);
-        rows.extend([0, 1, 2].map(|k| (all(&by.by(k)), error[k], covariance[(k, k)])));
+        variances
+            .fixed_rows_mut::<3>(rows)
+            .copy_from(&covariance.diagonal());
+        let by = vector::at(&Affine::identity(), &o.input, &o.input);
+        for i in 0..3 {
+            design.set_row(rows + i, &d_and_a(&by.by(i)).transpose());
+        }
     }
-    Some(Rows::of(rows, OF_TRIAD))
+    Some(Rows {
+        design,
+        errors,
+        variances,
+    })
 }
 
 /// How uncertain the parameters of each sensor are: the covariance of C by rows and o, and the half-width of a 95 % interval in standard deviations.
@@ -200,15 +214,17 @@ pub(super) fn announced(
     let mut of_accel = Covariance::zeros();
     // Errors of each observation: one for a magnitude, two for a turn.
     let (rows, each) = match (prepared.manifest.reference, sensor) {
-        (Reference::Table, _) => (known_rows(prepared, sensor, &model)?, 1.0),
+        (Reference::Table, _) => (known(prepared, sensor, &model)?, 1.0),
         (Reference::Gravity | Reference::TurntableRate, Sensor::Accel) => {
             (by_gravity(prepared, &model).pop()?, 1.0)
         }
         (Reference::TurntableRate, Sensor::Gyro) => {
             let dwells = RatedDwells::of(prepared).ok()?;
-            let of_gyro = [(Sensor::Gyro, &model, symmetric as fn(&ByTriad) -> _)];
-            let rows = Rows::of_groups(&magnitudes(&dwells, &model), &of_gyro).pop()?;
-            (rows, 1.0)
+            let factors = magnitudes(&dwells, &model);
+            (
+                Rows::of_groups(&factors, &[(Sensor::Gyro, &model)]).pop()?,
+                1.0,
+            )
         }
         (Reference::Gravity, Sensor::Gyro) => {
             let accel = calibration.inverse(Sensor::Accel)?;
@@ -218,19 +234,21 @@ pub(super) fn announced(
             (by_directions(prepared, &model, &accel)?.swap_remove(0), 2.0)
         }
     };
-    let square = |row: &[f64]| {
-        let part = |row: &[f64], covariance: &Covariance| {
-            let by = spread(row);
-            by.dot(&(covariance * by))
-        };
-        match row.len() {
-            n if n > OF_TRIAD => part(&row[..OF_TRIAD], &own) + part(&row[OF_TRIAD..], &of_accel),
-            _ => part(row, &own),
-        }
+    // Of A of the accelerometer only the symmetric part counts.
+    let transposed = |k: usize| match k {
+        0..3 => k,
+        k => 3 + 3 * (k % 3) + (k - 3) / 3,
     };
-    let n = rows.design.nrows();
-    let row = |i: usize| -> Vec<f64> { rows.design.row(i).iter().copied().collect() };
-    let sum: f64 = (0..n).map(|i| square(&row(i))).sum();
+    let symmetric = Covariance::from_fn(|i, j| {
+        0.5 * (f64::from(u8::from(i == j)) + f64::from(u8::from(i == transposed(j))))
+    });
+    let parts = [own, symmetric * of_accel * symmetric];
+    let (n, triads) = (rows.design.nrows(), rows.design.ncols() / OF_TRIAD);
+    let square = |(k, covariance): (usize, &Covariance)| {
+        let by = rows.design.columns(OF_TRIAD * k, OF_TRIAD);
+        (by * covariance).component_mul(&by).sum()
+    };
+    let sum: f64 = parts.iter().take(triads).enumerate().map(square).sum();
     (n > 0).then(|| sigmas * (each * sum.max(0.0) / n as f64).sqrt())
 }
 
@@ -239,45 +257,16 @@ pub(super) fn of_errors(
     model: &Affine<f64>,
     (covariance, sigmas): (Covariance, f64),
 ) -> Option<(Covariance, f64)> {
-    let by = changes(model)?;
+    let changes = |k: usize| d_and_a(&of_output(&ByTriad::ith(k, 1.0), model));
+    let changes: [ByTriad; OF_TRIAD] = std::array::from_fn(changes);
+    let by = Covariance::from_columns(&changes)
+        .transpose()
+        .try_inverse()?;
     Some((by * covariance * by.transpose(), sigmas))
 }
 
-/// Derivatives of d and A by C by rows and o.
-fn changes(model: &Affine<f64>) -> Option<Covariance> {
-    let rows: [Vec<f64>; 12] =
-        std::array::from_fn(|k| all(&of_output(&ByTriad::ith(k, 1.0), model)));
-    Covariance::from_fn(|k, j| rows[k][j]).try_inverse()
-}
-
-/// A row's derivatives by d and A; one by d and the symmetric part of A is spread over both halves. Columns of the accelerometer are left out.
-fn spread(row: &[f64]) -> SVector<f64, 12> {
-    let mut by = SVector::<f64, 12>::zeros();
-    if row.len() != OF_MAGNITUDE {
-        by.copy_from_slice(&row[..OF_TRIAD]);
-        return by;
-    }
-    by.fixed_rows_mut::<3>(0).copy_from_slice(&row[..3]);
-    for ((i, j), value) in SYMMETRIC.iter().zip(&row[3..]) {
-        by[3 + 3 * i + j] += 0.5 * value;
-        by[3 + 3 * j + i] += 0.5 * value;
-    }
-    by
-}
-
 fn by_gravity(prepared: &Prepared, accel: &Affine<f64>) -> Vec<Rows> {
-    Rows::of_groups(
-        &prepared.magnitudes(accel),
-        &[(Sensor::Accel, accel, symmetric)],
-    )
-}
-
-fn by_rate(prepared: &Prepared, gyro: &Affine<f64>) -> Option<Causes> {
-    let dwells = RatedDwells::of(prepared).ok()?;
-    let mut factors = magnitudes(&dwells, gyro);
-    factors.rests(&dwells.rests);
-    let rows = Rows::of_groups(&factors, &[(Sensor::Gyro, gyro, symmetric)]);
-    separate(&rows, &[0..3, 3..9])
+    Rows::of_groups(&prepared.magnitudes(accel), &[(Sensor::Accel, accel)])
 }
 
 /// Directions after turns, rates at rest, and magnitudes of gravity. `None` without a turn.
@@ -290,33 +279,36 @@ fn by_directions(
     let mut factors = Factors::of_turns(&turns);
     factors.rests(&prepared.rest(accel));
     factors.list.extend(prepared.magnitudes(accel).list);
-    let triads: [Columns; 2] = [(Sensor::Gyro, gyro, all), (Sensor::Accel, accel, symmetric)];
+    let triads = [(Sensor::Gyro, gyro), (Sensor::Accel, accel)];
     (!turns.is_empty()).then(|| Rows::of_groups(&factors, &triads))
 }
 
-/// Separates the mean square of the first group into what each range of columns explains: bias, matrix and, if there is a third, the accelerometer.
-/// Columns of inputs that the recording lacks are dropped.
-fn separate(groups: &[Rows], causes: &[Range<usize>]) -> Option<Causes> {
-    let columns = groups.first()?.design.ncols();
-    let size = |j: usize| {
-        groups
-            .iter()
-            .map(|g| g.design.column(j).norm())
-            .sum::<f64>()
+/// Separates the mean square of the first group into what the unknowns of each cause explain: bias, matrix and, if there is a third, the accelerometer.
+/// Unknowns of inputs that the recording lacks are dropped.
+fn separate(groups: &[Rows], causes: &[Vec<Vec<usize>>]) -> Option<Causes> {
+    let groups: Vec<Rows> = groups.iter().map(|g| g.by(&causes.concat())).collect();
+    let ends = causes.iter().scan(0, |end, cause| {
+        *end += cause.len();
+        Some(*end - cause.len()..*end)
+    });
+    let size = |j: &usize| {
+        let norms = groups.iter().map(|g| g.design.column(*j).norm());
+        norms.sum::<f64>()
     };
-    let kept: Vec<usize> = (0..columns).filter(|j| size(*j) > 0.0).collect();
+    let columns = groups.first()?.design.ncols();
+    let kept: Vec<usize> = (0..columns).filter(|j| size(j) > 0.0).collect();
     let count: usize = groups.iter().map(|g| g.errors.len()).sum();
-    if count <= kept.len() || groups[0].errors.is_empty() || !determined(groups, &kept) {
+    if count <= kept.len() || groups[0].errors.is_empty() || !determined(&groups, &kept) {
         return None;
     }
     let by_group: Vec<Group> = groups.iter().map(|g| g.group(&kept)).collect();
     let (solution, _) = solve_groups(&by_group)?;
     let judged = &by_group[0];
-    let of = |range: &Range<usize>| {
+    let of = |range: Range<usize>| {
         let ours = (0..kept.len()).filter(|k| range.contains(&kept[*k]));
         Part::of(judged, &solution, &ours.collect::<Vec<_>>())
     };
-    let mut parts: Vec<Part> = causes.iter().map(of).collect();
+    let mut parts: Vec<Part> = ends.map(of).collect();
     let rest = &judged.observations - &judged.design * &solution.parameters;
     let dof = (count - kept.len()) as f64;
     parts.push(Part {
@@ -341,21 +333,15 @@ fn separate(groups: &[Rows], causes: &[Range<usize>]) -> Option<Causes> {
 
 /// Whether the errors distinguish all columns.
 fn determined(groups: &[Rows], kept: &[usize]) -> bool {
-    let rows: usize = groups.iter().map(|g| g.errors.len()).sum();
-    let mut white = DMatrix::zeros(rows, kept.len());
-    let mut from = 0;
-    for group in groups {
-        for (i, row) in group.design.row_iter().enumerate() {
-            let sigma = group.variances[i].max(f64::MIN_POSITIVE).sqrt();
-            for (k, column) in kept.iter().enumerate() {
-                white[(from + i, k)] = row[*column] / sigma;
-            }
-        }
-        from += group.errors.len();
-    }
+    let rows = groups.iter().flat_map(|group| {
+        let sigmas = group.variances.map(|v| v.max(f64::MIN_POSITIVE).sqrt());
+        let rows = group.design.select_columns(kept);
+        let each = (0..sigmas.len()).map(move |i| rows.row(i) / sigmas[i]);
+        each.collect::<Vec<_>>()
+    });
+    let mut white = DMatrix::from_rows(&rows.collect::<Vec<_>>());
     for mut column in white.column_iter_mut() {
-        let norm = column.norm();
-        column /= norm;
+        column.normalize_mut();
     }
     Observability::of(&white).condition < ALIKE
 }

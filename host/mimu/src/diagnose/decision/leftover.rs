@@ -121,10 +121,7 @@ pub(super) fn leftover(
         return left;
     };
     for (s, stratum) in rows.strata.iter().enumerate() {
-        let (extra_white, random_walk) = (
-            last.components.extra_white[s],
-            last.components.random_walk[s],
-        );
+        let [extra_white, random_walk] = last.components[s];
         let unit = stratum
             .random_walk
             .as_ref()
@@ -136,9 +133,9 @@ pub(super) fn leftover(
         // Without the components of this stratum: is the known noise enough? A random walk stays if the wander was not recorded, because
         // every bias wanders.
         let mut bare = last.components.clone();
-        bare.extra_white[s] = 0.0;
+        bare[s][0] = 0.0;
         if stratum.wander_known {
-            bare.random_walk[s] = 0.0;
+            bare[s][1] = 0.0;
         }
         let Some(bare) = variance.fit_at(model, &bare) else {
             continue;
