@@ -147,7 +147,6 @@ def diagnose(
     *,
     verify: Recording | Sequence[Recording] | None = None,
     calibration: CalibrationLike | None = None,
-    accept: Sequence[str] = (),
     still: float | None = None,
     steps: Steps | None = None,
     keep: Keep | None = None,
@@ -159,13 +158,13 @@ def diagnose(
 
     ``recordings``: one, or more of the same unit; the calibration is that of the first. ``verify`` is one other recording, or a list of one, in
     which no effect is searched: an effect that it contradicts is not accepted. Judge by further recordings with :func:`mimu.verify`. The matrices
-    of ``calibration`` are kept, for a unit that is never turned. ``accept`` names terms to accept on the evidence of these recordings alone. The
-    other arguments are those of :func:`mimu.fit`.
+    of ``calibration`` are kept, for a unit that is never turned. The other arguments are those of
+    :func:`mimu.fit`.
     """
     others = [] if verify is None else several(verify, "verify")
     if len(others) > 1:
         raise Error.of("verify", "a diagnosis is judged by one other recording", "judge its calibration by more with mimu.verify")
-    options = dict(accept=accept, still=still, steps=steps, keep=kept(keep), whole_turns=whole_turns, placement=placement)
+    options = dict(still=still, steps=steps, keep=kept(keep), whole_turns=whole_turns, placement=placement)
     return Diagnosis(
         _mimu.diagnose(
             several(recordings), arguments(options), verify=others[0] if others else None,

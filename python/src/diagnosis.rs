@@ -40,7 +40,7 @@ impl Diagnosis {
     }
 
     /// The content of the page, as a fragment of HTML.
-    fn html(&self, py: Python<'_>) -> PyResult<String> {
+    fn html(&self) -> String {
         let result = &self.done.result;
         let places: Vec<&str> = result.recordings.iter().map(|r| r.place.as_str()).collect();
         let made = Made {
@@ -48,7 +48,7 @@ impl Diagnosis {
             command: "mimu.diagnose".into(),
             created: self.created.clone(),
         };
-        fragment::of_diagnosis(result, &made).map_err(|error| raised(py, &error))
+        fragment::of_diagnosis(result, &made)
     }
 
     /// The calibration, with the effects that the unit has.
@@ -93,7 +93,6 @@ pub(crate) fn diagnose(
             more: all,
             second,
             given: given.as_ref().map(|(model, _)| model.as_ref()),
-            accept: args.accept.clone(),
         };
         let given = given.as_ref().map(|(_, name)| name.as_str());
         Ok(diagnosed(

@@ -108,7 +108,6 @@ def test_options_that_there_are_not_are_errors_of_type_or_value(arrays: mimu.Rec
         lambda rec, here: mimu.allan(rec, confidence=2.0),
         lambda rec, here: mimu.verify(rec, here),
         lambda rec, here: mimu.diagnose([]),
-        lambda rec, here: mimu.diagnose(rec, accept=["none"]),
         lambda rec, here: mimu.thermal.fit(rec, range_c=(60, -20)),
         lambda rec, here: mimu.thermal.fit(rec, lag_s=1e9),
         lambda rec, here: mimu.load(here),

@@ -437,7 +437,6 @@ fn judge(case: &mut Case) -> Result<()> {
         more: all,
         second: None,
         given: None,
-        accept: Vec::new(),
     };
     let diagnosis = reported(diagnose(recordings, Options::IN_SAMPLE)?);
     case.verdict = diagnosis.verdict.name().into();

@@ -82,12 +82,11 @@ pub(crate) fn of_thermal(warning: &OverTemperature) -> String {
     }
 }
 
-/// Why an effect was rejected, with the flags that would accept it.
+/// Why an effect was rejected, with the flag of the recording that would confirm it.
 pub(crate) fn of_rejected(rejected: &Rejected) -> String {
-    let Rejected { id, reason, .. } = rejected;
-    match reason {
-        Reason::Suggestion(_) => format!("{reason} (--verify, --accept {id})"),
-        _ => reason.to_string(),
+    match &rejected.reason {
+        reason @ Reason::Suggestion(_) => format!("{reason} (--verify)"),
+        reason => reason.to_string(),
     }
 }
 
@@ -123,15 +122,14 @@ mod tests {
     }
 
     #[test]
-    fn a_suggestion_names_the_flags_that_confirm_it() {
+    fn a_suggestion_names_the_flag_that_confirms_it() {
         let rejected = |reason| Rejected {
             id: "term:accel_x~rate_y*force_z".into(),
             sensor: Sensor::Accel,
             reason,
         };
         let said = of_rejected(&rejected(Reason::Suggestion(1e-9)));
-        let flags = "or accept it (--verify, --accept term:accel_x~rate_y*force_z)";
-        assert!(said.ends_with(flags), "{said}");
+        assert!(said.ends_with("that shows it (--verify)"), "{said}");
         let said = of_rejected(&rejected(Reason::OneDwell(0.83)));
         assert_eq!(said, "one dwell contains 83 % of its information");
     }

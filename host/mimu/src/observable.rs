@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::quantity::AXES;
+use crate::quantity::{AXES, Figure};
 
 /// The quantity of observations that share their noise.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -29,6 +29,27 @@ pub enum Observable {
     Magnitude,
     /// Specific forces in poses that turns connect.
     Force,
+}
+
+impl Observable {
+    /// The quantity of its residuals.
+    pub fn figure(self) -> Figure {
+        match self {
+            Self::Turns | Self::AfterWholeTurns | Self::WholeTurns | Self::AsDelivered => {
+                Figure::Direction
+            }
+            Self::Magnitude => Figure::GravityMagnitude,
+            _ => Figure::Input,
+        }
+    }
+
+    /// Number of residuals of an error: a direction has two.
+    pub fn components(self) -> usize {
+        match self {
+            Self::Turns | Self::AfterWholeTurns => 2,
+            _ => 1,
+        }
+    }
 }
 
 impl fmt::Display for Observable {

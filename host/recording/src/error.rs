@@ -86,7 +86,6 @@ arguments! {
     SkipBroken, "--skip-broken", "How many rows that cannot be read are left out.";
     TrustReadings, "--trust-readings", "Whether readings that look wrong are used.";
     SignedLowByte, "--signed-low-byte", "Columns whose low byte a firmware took for a signed number.";
-    Accept, "--accept", "Products that are accepted on the evidence of one recording.";
     Force, "--force", "Writing a calibration that is judged a misfit.";
     Base, "--base", "The calibration at one temperature that curves are added to.";
     Range, "--range", "Temperatures that a plan covers.";

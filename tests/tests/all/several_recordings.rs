@@ -47,7 +47,6 @@ fn together(first: Prepared, more: Vec<Prepared>) -> Diagnosis {
         more,
         second: None,
         given: None,
-        accept: Vec::new(),
     };
     diagnose(recordings, Options::IN_SAMPLE).expect("a diagnosis")
 }
@@ -58,7 +57,6 @@ fn judged_by(first: Prepared, second: Prepared) -> Diagnosis {
         more: Vec::new(),
         second: Some(second),
         given: None,
-        accept: Vec::new(),
     };
     diagnose(recordings, Options::IN_SAMPLE).expect("a diagnosis")
 }

@@ -40,9 +40,6 @@ pub struct DiagnoseArgs {
     /// Its effects are removed first, and are written to the new file too.
     #[arg(long, value_name = "FILE")]
     calibration: Option<PathBuf>,
-    /// Accept this product (`term:...`) on the evidence of this recording alone
-    #[arg(long, value_name = "ID")]
-    pub accept: Vec<String>,
     /// Calibration file to write, with the effects that were found
     #[arg(short, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -117,7 +114,6 @@ pub fn run(args: &DiagnoseArgs, command_line: &str) -> Result<Status> {
         more: all,
         second: args.verify.as_ref().map(open).transpose()?,
         given: given.as_ref(),
-        accept: args.accept.clone(),
     };
     let shown = |path: &Option<PathBuf>| path.as_ref().map(|p| p.display().to_string());
     let names = [shown(&args.verify), shown(&args.calibration)];
@@ -172,7 +168,7 @@ pub fn run(args: &DiagnoseArgs, command_line: &str) -> Result<Status> {
             command: command_line.to_owned(),
             created: now,
         };
-        files.push(stage(path, report::diagnosis_page(found, &made)?)?);
+        files.push(stage(path, report::diagnosis_page(found, &made))?);
     }
     for (what, path) in [("calibration", output), ("page", args.page.as_ref())] {
         if let Some(path) = path {

@@ -166,7 +166,7 @@ pub fn run(args: &ReportArgs, command_line: &str) -> Result<()> {
         command: command_line.to_owned(),
         created: now,
     };
-    stage(&args.out, unit_page(&unit, &made)?)?.publish()?;
+    stage(&args.out, unit_page(&unit, &made))?.publish()?;
     let verdict = verdict(&unit);
     show(&format!("{verdict}page: {}\n", args.out.display()))
 }
@@ -249,7 +249,6 @@ fn found(
         more: all.collect(),
         second: others.first().map(|r| r.1.clone()),
         given: None,
-        accept: Vec::new(),
     };
     let bar = progress("diagnosing");
     let done = diagnosed(recordings, [None, None], created, &|share| bar.reach(share));

@@ -416,7 +416,7 @@ fn page(command_line: &str) -> impl Fn(&DiagnosisResult, &Path) -> Result<String
             command: command_line.to_owned(),
             created: now(),
         };
-        report::diagnosis_page(found, &made)
+        Ok(report::diagnosis_page(found, &made))
     }
 }
 

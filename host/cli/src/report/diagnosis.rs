@@ -6,7 +6,7 @@ mod figures;
 use maud::{Markup, html};
 use mimu::diagnose::Verdict;
 use mimu::diagnose::decision::{Accepted, FALSE_LEFTOVER, LEVERAGE, Leftover};
-use mimu::diagnose::picture::{Omnibus, Picture};
+use mimu::diagnose::picture::Picture;
 use mimu::diagnose::search::{FALSE_FOUND, FALSE_LISTED};
 use mimu::fit::Split;
 use mimu::plan::next_experiment::{NotExcited, NotShown};
@@ -15,7 +15,6 @@ use mimu::readable;
 use mimu::result::diagnosis::{DiagnosisResult, SecondResult, SensorDiagnosisResult};
 use mimu::warning::Warning;
 use mimu_recording::Reference;
-use mimu_recording::error::{Error, Result};
 
 use super::page::{Level, Made, judged, kinds, page, problems, quantity, shown, spoken, written};
 use super::table::{number, table, with_unit};
@@ -54,18 +53,14 @@ pub fn diagnosis_text(d: &DiagnosisResult, detail: Detail) -> String {
 }
 
 /// The page of a diagnosis.
-pub fn diagnosis_page(d: &DiagnosisResult, made: &Made) -> Result<String> {
+pub fn diagnosis_page(d: &DiagnosisResult, made: &Made) -> String {
     let title = format!("Diagnosis of {}: {}", d.device, d.verdict.name());
-    Ok(page(&title, &body(d, made)?))
+    page(&title, &body(d, made))
 }
 
 /// Contents of the page.
-///
-/// # Errors
-/// See [`drawable`].
-pub(super) fn body(d: &DiagnosisResult, made: &Made) -> Result<Markup> {
-    drawable(d, made)?;
-    Ok(html! {
+pub(super) fn body(d: &DiagnosisResult, made: &Made) -> Markup {
+    html! {
         h1 { "Diagnosis of " (d.device) }
         (first(d, Level::Page))
         (identity(d, made))
@@ -76,21 +71,6 @@ pub(super) fn body(d: &DiagnosisResult, made: &Made) -> Result<Markup> {
         (recorded(d))
         (method())
         (made.line(d.tool))
-    })
-}
-
-/// Whether all figures can be drawn.
-///
-/// # Errors
-/// A model of the diagnosis is singular, so that nothing can be drawn.
-pub(super) fn drawable(d: &DiagnosisResult, made: &Made) -> Result<()> {
-    match d.sensors.present().all(|(_, s)| s.picture.is_some()) {
-        true => Ok(()),
-        false => Err(Error::new(
-            &made.recording,
-            "a model of the page is singular",
-            "diagnose without --page, and report this",
-        )),
     }
 }
 
@@ -158,7 +138,7 @@ pub(super) fn errors(d: &DiagnosisResult, level: Level) -> Markup {
     html! {
         (table("Root mean square error. Noise floor: the error that would remain if the model were complete.", &html! {
             th { "rms error" } th.n { "in sample" } th.n { "held out" } th.n { "noise floor" } @if beside.is_some() { th.n { "second recording" } th {} } th.page { "error of" }
-        }, &html! { @for (name, s) in d.sensors.present() { @for (label, [rms, held_out], after) in steps(d, name, s, level) { tr {
+        }, &html! { @for (name, s) in d.sensors.present() { @for (label, [rms, held_out], after) in steps(d, name, s) { tr {
             @let unit = readable::error(s.unit);
             td { (with_unit(label, &unit)) }
             @for rms in [rms, held_out] { (number(if s.says_anything() { rms } else { f64::NAN }, unit.factor)) }
@@ -182,32 +162,17 @@ pub(super) fn errors(d: &DiagnosisResult, level: Level) -> Markup {
     }
 }
 
-/// Models of a sensor: label, errors in sample and held out, and whether effects are taken out. A page has a row for each effect.
+/// Without effects and with them: label, errors in sample and held out, and whether effects are taken out.
 fn steps(
     d: &DiagnosisResult,
     name: Sensor,
     s: &SensorDiagnosisResult,
-    level: Level,
 ) -> Vec<(String, [f64; 2], bool)> {
-    let mut all = vec![(
-        name.to_string(),
-        [s.rms_before, s.held_out_rms_before],
-        false,
-    )];
-    match s.picture.as_ref().filter(|_| level.is_page()) {
-        Some(picture) => all.extend(picture.steps[1..].iter().map(|step| {
-            (
-                format!("+ {}", step.adds),
-                [step.rms, step.held_out_rms],
-                true,
-            )
-        })),
-        None if accepted(d, name).next().is_some() => all.push((
-            "  with effects".into(),
-            [s.rms_after, s.held_out_rms_after],
-            true,
-        )),
-        None => {}
+    let before = [s.rms_before, s.held_out_rms_before];
+    let mut all = vec![(name.to_string(), before, false)];
+    if accepted(d, name).next().is_some() {
+        let after = [s.rms_after, s.held_out_rms_after];
+        all.push(("  with effects".into(), after, true));
     }
     all
 }
@@ -246,12 +211,12 @@ fn sensor(d: &DiagnosisResult, name: Sensor, s: &SensorDiagnosisResult, level: L
         p { (name) " (" (s.figure.description()) ")" @if !found { ": no effect found" } }
         section {
             (remarks(s, level))
-            @for (k, of) in accepted(d, name).enumerate() { (effect::section(d, s, of, s.picture.as_ref().and_then(|p| Some((p, p.effects.get(k)?))), level)) }
+            @for (k, of) in accepted(d, name).enumerate() { (effect::section(d, s, of, s.picture.effects.get(k).map(|panels| (&s.picture, panels)), level)) }
             @for note in &s.notes {
                 p { "note: " @if level.has_all() || note.advice.is_empty() { (note.to_string()) } @else { (note.found) " (--verbose)" } }
             }
             (residuals(d, name, level))
-            @if let (Some(picture), true) = (&s.picture, level.is_page()) { (drawn(picture, found)) }
+            @if level.is_page() { (drawn(&s.picture, found)) }
         }
     }
 }
@@ -295,9 +260,8 @@ fn residuals(d: &DiagnosisResult, name: Sensor, level: Level) -> Markup {
     }
 }
 
-/// Residuals in time, and compared with noise; `after` if there are effects.
+/// Residuals in time; `after` if there are effects.
 fn drawn(picture: &Picture, after: bool) -> Markup {
-    let [before, left] = &picture.omnibus;
     html! {
         h3 { "Residuals in time" }
         figure {
@@ -308,23 +272,7 @@ fn drawn(picture: &Picture, after: bool) -> Markup {
                 @if after { " Before and after have the same scale." }
             }
         }
-        h3 { "Residuals compared with noise" }
-        figure class="whole" {
-            div class="figures" { (figures::quantiles(picture, after)) }
-            figcaption {
-                "All residuals divided by their known noise, against normal quantiles (line: normal noise; band: 95 % of each "
-                "point). Chi-square with the known noise: "
-                (omnibus(if after { "before " } else { "" }, before))
-                @if after { "; " (omnibus("after ", left)) }
-                ". The known noise includes the wander of a bias between dwells only if the noise at rest was given. "
-                "The verdict allows for this wander; this test does not."
-            }
-        }
     }
-}
-
-fn omnibus(when: &str, &Omnibus { chi2, dof, p }: &Omnibus) -> Markup {
-    html! { (when) (shown(chi2, 1.0, "")) " for " (dof) " degrees of freedom, " (chance(p)) }
 }
 
 /// A p value.

@@ -12,7 +12,6 @@ use mimu::result::allan::AllanResult;
 use mimu::result::diagnosis::DiagnosisResult;
 use mimu::result::fit::FitResult;
 use mimu::result::sessions::SessionsResult;
-use mimu_recording::error::Result;
 use mimu_thermal::result::ThermalResult;
 
 use super::page::{Level, Made, STYLE};
@@ -31,11 +30,8 @@ pub fn of_fit(fit: &Fit, result: &FitResult, calibration: &Calibration) -> Strin
 }
 
 /// A diagnosis, as on its page.
-///
-/// # Errors
-/// A model of the diagnosis is singular, so that nothing can be drawn.
-pub fn of_diagnosis(result: &DiagnosisResult, made: &Made) -> Result<String> {
-    Ok(fragment(&diagnosis::body(result, made)?))
+pub fn of_diagnosis(result: &DiagnosisResult, made: &Made) -> String {
+    fragment(&diagnosis::body(result, made))
 }
 
 /// Noise: coefficients and curves.

@@ -13,7 +13,6 @@ use mimu::data_sheet::DataSheet;
 use mimu::noise::noise_file::NoiseFile;
 use mimu::prepared::Prepared;
 use mimu::result::diagnosis::DiagnosisResult;
-use mimu_recording::error::Result;
 
 use super::page::{Level, Made, contents, judged, page};
 use super::{data_sheet, diagnosis, verify};
@@ -41,13 +40,7 @@ pub struct UnitReport<'a> {
 }
 
 /// The page of a unit.
-///
-/// # Errors
-/// A model of the diagnosis is singular, so that nothing can be drawn.
-pub fn unit_page(unit: &UnitReport, made: &Made) -> Result<String> {
-    unit.diagnosis
-        .map(|d| diagnosis::drawable(d, made))
-        .transpose()?;
+pub fn unit_page(unit: &UnitReport, made: &Made) -> String {
     let (calibration, found) = (unit.calibration, unit.diagnosis);
     let main = html! {
         h1 { "Inertial unit " (calibration.device) }
@@ -85,7 +78,7 @@ pub fn unit_page(unit: &UnitReport, made: &Made) -> Result<String> {
             h2 id="recordings" { "Recordings" }
             @for (name, prepared) in unit.recordings {
                 h3 { code { (name) } }
-                (poses::figure(prepared, calibration, found.sensors.accel.as_ref().and_then(|s| s.picture.as_ref())))
+                (poses::figure(prepared, calibration, found.sensors.accel.as_ref().map(|s| &s.picture)))
                 (trace::figure(prepared))
             }
             (diagnosis::recorded(found))
@@ -95,7 +88,7 @@ pub fn unit_page(unit: &UnitReport, made: &Made) -> Result<String> {
         (made.line(concat!("mimu ", env!("CARGO_PKG_VERSION"))))
     };
     let verdict = found.map_or("calibration", |d| d.verdict.name());
-    Ok(page(&format!("{}: {verdict}", calibration.device), &main))
+    page(&format!("{}: {verdict}", calibration.device), &main)
 }
 
 /// The raw readings of a recording over time, with its dwells, as a part of a page.

@@ -132,6 +132,7 @@ impl Effects {
             Regressor::Logarithm(q) => {
                 format!("log1pf({} / {})", quantity(*q)?, number(parameter))
             }
+            Regressor::Since { .. } => return None,
         })
     }
 

@@ -10,8 +10,9 @@
 //! where it falls from 8.4 to 1.7 mm/s², the directions of gravity may err more, and turns show these.
 
 use mimu_core::compensation::Affine;
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{DVector, Vector3};
 
+use super::Calibrator;
 use super::columns::basis;
 use super::decision::{Accepted, Decision};
 use super::rejected::{ErrorRms, Reason, Rejected};
@@ -41,9 +42,7 @@ pub(super) struct AsWritten<'a> {
     pub before: &'a Fit,
     /// The other recordings, likewise.
     pub others: &'a [Prepared],
-    pub calibrate: &'a dyn Fn(Prepared) -> mimu_recording::error::Result<Fit>,
-    /// The same with parts of the recording held out.
-    pub hold_out: &'a dyn Fn(Prepared) -> mimu_recording::error::Result<Fit>,
+    pub calibrator: &'a Calibrator<'a>,
 }
 
 /// How the errors of one kind of observation change from the file without effects to that with them.
@@ -89,16 +88,6 @@ fn models(fit: &Fit) -> [Option<Affine<f64>>; 2] {
     Sensor::BOTH.map(|s| Some(fit.sensor(s)?.estimated.triad.inverse))
 }
 
-/// The figure of a row, and how many rows count as one error.
-fn figure(observable: Observable) -> (Figure, f64) {
-    match observable {
-        Observable::Turns => (Figure::Direction, 2.0),
-        Observable::WholeTurns => (Figure::Direction, 1.0),
-        Observable::Magnitude => (Figure::GravityMagnitude, 1.0),
-        _ => (Figure::Input, 1.0),
-    }
-}
-
 /// Residuals with the biases fitted, at these components.
 fn left(rows: &Rows, at: &Components) -> Option<DVector<f64>> {
     let model = basis(&rows.nuisance);
@@ -118,11 +107,8 @@ fn least(both: [&Rows; 2]) -> Option<Components> {
         )
     });
     let (a, b) = (a?, b?);
-    let least = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a.min(*b)).collect();
-    Some(Components {
-        extra_white: least(&a.extra_white, &b.extra_white),
-        random_walk: least(&a.random_walk, &b.random_walk),
-    })
+    let least = |(a, b): (&[f64; 2], &[f64; 2])| [a[0].min(b[0]), a[1].min(b[1])];
+    Some(a.iter().zip(&b).map(least).collect())
 }
 
 /// The changes of each kind of row from the first of `both` to the second.
@@ -132,19 +118,17 @@ fn changes(both: [&Rows; 2], recording: &str) -> Option<Vec<Change>> {
     let plain = [left(without, &at)?, left(with, &at)?];
     let variance = VarianceModel::new(without, false);
     let whitener = variance.whitener(&at)?;
-    let white = plain
-        .each_ref()
-        .map(|left| whitener.whiten(&DMatrix::from_column_slice(left.len(), 1, left.as_slice())));
+    let white = plain.each_ref().map(|left| whitener.vector(left));
     let kinds = [Figure::Direction, Figure::GravityMagnitude, Figure::Input];
     let changes = kinds.into_iter().filter_map(|kind| {
         let ours = || {
             without
                 .strata
                 .iter()
-                .filter(move |s| figure(s.name.0).0 == kind)
+                .filter(move |s| s.name.0.figure() == kind)
         };
         let errors = plain.each_ref().map(|left| {
-            let squares = |(name, r): (Observable, f64)| r * r * figure(name).1;
+            let squares = |(name, r): (Observable, f64)| r * r * name.components() as f64;
             let each = ours().flat_map(|s| s.rows.clone().map(|r| (s.name.0, left[r])));
             let count = ours().map(|s| s.rows.len()).sum::<usize>() as f64;
             ErrorRms {
@@ -247,7 +231,8 @@ impl AsWritten<'_> {
             }
         }
         if self.sensor == Sensor::Accel && by_hand(&self.before.prepared) {
-            let fits = [self.before, after].map(|fit| (self.hold_out)(fit.prepared.clone()).ok());
+            let fits =
+                [self.before, after].map(|fit| self.calibrator.judged(fit.prepared.clone()).ok());
             if let [Some(without), Some(with)] = &fits {
                 all.extend(change_of_turns([without, with]));
             }
@@ -301,7 +286,7 @@ impl AsWritten<'_> {
             let [gyro, accel] = models(self.before);
             let first = &self.before.prepared;
             let clean = remove(first, gyro.as_ref(), accel.as_ref(), &rest)?;
-            let fit = (self.calibrate)(clean).ok()?;
+            let fit = self.calibrator.calibrate(clean).ok()?;
             Some(
                 self.worst_change(&fit, &rest)
                     .map_or(f64::NEG_INFINITY, |c| c.growth),

@@ -30,7 +30,7 @@ use crate::effects::effect::Effect;
 use crate::fit::{SensorFit, Split};
 use acceptance::Acceptance;
 pub use accepted::Accepted;
-use accepted::{accepted, coefficients_of};
+use accepted::accepted;
 use choice::{Choice, choose};
 use in_time::others_in_time;
 use leftover::leftover;
@@ -159,13 +159,12 @@ impl Decision {
 
 /// Decides on the rows of one sensor. `dwell_ends` are the times between dwells, where a bias may have jumped: index of the recording and s.
 /// `unseen` are the rows of a second recording, in which no effects are sought; an effect that it contradicts is not accepted. `without` are
-/// effects that are not tried, each with the reason. `accept` are ids of terms that need no second recording. `heard` is told the share that is done.
+/// effects that are not tried, each with the reason.  `heard` is told the share that is done.
 pub fn decide(
     rows: &Rows,
     dwell_ends: &[(usize, f64)],
     unseen: Option<&Rows>,
     without: &[Rejected],
-    accept: &[String],
     heard: Heard,
 ) -> Option<Decision> {
     let (mut all, not_excited) = candidates(rows, dwell_ends);
@@ -189,7 +188,7 @@ pub fn decide(
         suggested,
         mut rejected,
         mut not_excited,
-    } = choose(&search, &judge, found, not_excited, without, accept)?;
+    } = choose(&search, &judge, found, not_excited, without)?;
     heard(0.9);
     nonlinear::refine(&search, &mut kept, &mut with);
     others_in_time(&search, &mut kept, &with);
@@ -214,7 +213,7 @@ pub fn decide(
     let known = rejected.iter().map(|r| r.id.as_str());
     let known: Vec<&str> = known.chain(not_excited.iter().map(|n| n.id)).collect();
     let beside = (&kept[..], &with);
-    let others = not_chosen(&search, &judge, beside, &jumps, &superfluous, &known)?;
+    let others = not_chosen(&search, beside, &jumps, &superfluous, &known)?;
     rejected.extend(others);
     let of_readings = of_readings(&search, model, last, split);
     // Scatter beside these functions of the readings.

@@ -39,7 +39,7 @@ use rows::{ForceErrors, FreeParameters, Rows, Session};
 use serde::{Deserialize, Serialize};
 
 use crate::calibration::Calibration;
-use crate::effects::fitted::{FittedEffect, candidate};
+use crate::effects::fitted::FittedEffect;
 use crate::effects::removal::{removable, remove_within};
 use crate::estimate::least_squares::POORLY_DETERMINED;
 use crate::fit::{Fit, Options, fit, fit_biases};
@@ -48,7 +48,7 @@ use crate::quantity::{Sensor, significant};
 use crate::recording_problem::OfRecording;
 use crate::triad::{Covariance, Part, Triad};
 use crate::warning::Warning;
-use mimu_recording::error::{Argument, Error, Result};
+use mimu_recording::error::{Error, Result};
 use mimu_recording::{RawUnit, Reference, two_units};
 
 /// Result of a diagnosis in one word.
@@ -166,8 +166,8 @@ pub struct SensorDiagnosis {
     pub rows: Rows,
     /// Decision on these rows.
     pub decision: Decision,
-    /// Data for its plots; `None` if a model is singular.
-    pub picture: Option<Picture>,
+    /// Data for its plots.
+    pub picture: Picture,
 }
 
 /// What was found in a recording.
@@ -228,8 +228,6 @@ pub struct Recordings<'a> {
     pub second: Option<Prepared>,
     /// A calibration of the unit, if the first recording cannot determine one. Its matrices are kept, and its effects are removed.
     pub given: Option<&'a Calibration>,
-    /// Ids of products to accept without confirmation by a second recording.
-    pub accept: Vec<String>,
 }
 
 impl From<Prepared> for Recordings<'_> {
@@ -239,7 +237,6 @@ impl From<Prepared> for Recordings<'_> {
             more: Vec::new(),
             second: None,
             given: None,
-            accept: Vec::new(),
         }
     }
 }
@@ -258,15 +255,6 @@ impl Recordings<'_> {
                 "only the magnitude of the rate is known, but a diagnosis needs known inputs or gravity",
                 "give a recording from a rate table or by hand; a fit and a verification take this one",
             ));
-        }
-        let is_product = |id: &&String| candidate(id).is_some_and(|c| !c.is_listed());
-        if let Some(other) = self.accept.iter().find(|id| !is_product(id)) {
-            return Err(Error::new(
-                "products to accept",
-                format!("{other:?} is not the id of a product"),
-                "give an id that a diagnosis suggests, such as term:gyro_x~force_y*temp",
-            )
-            .about(Argument::Accept));
         }
         let raw_unit = self.first.manifest.raw_unit;
         for other in self.later() {
@@ -357,11 +345,6 @@ fn with_temperature(now: &mut Fit, sensors: &[SensorDiagnosis]) {
     });
 }
 
-fn singular(place: &str) -> Error {
-    let remedy = "check the columns of the recording";
-    Error::new(place, "the calibration is singular", remedy)
-}
-
 /// Who is told the share of a diagnosis that is done, from 0 to 1. It never falls.
 pub type Heard<'a> = &'a dyn Fn(f64);
 
@@ -386,7 +369,11 @@ impl<'a> Calibrator<'a> {
     }
 
     fn singular(&self) -> Error {
-        singular(&self.recordings.first.place)
+        let (place, remedy) = (
+            &self.recordings.first.place,
+            "check the columns of the recording",
+        );
+        Error::new(place, "the calibration is singular", remedy)
     }
 
     fn free(&self, sensor: Sensor) -> FreeParameters<'_> {
@@ -480,18 +467,12 @@ impl Found<'_> {
     }
 
     fn best_pass(&self, sensor: Sensor, heard: Heard) -> Result<Pass> {
-        let recordings = self.calibrator.recordings;
         let passes = Passes {
             sensor,
             now: &self.now,
             later: &self.later,
-            found_in: 1 + recordings.more.len(),
             forces: self.forces.as_ref(),
-            free: self.calibrator.free(sensor),
-            accept: &recordings.accept,
-            calibrate: &|prepared| self.calibrator.calibrate(prepared),
-            hold_out: &|prepared| self.calibrator.judged(prepared),
-            place: &recordings.first.place,
+            calibrator: self.calibrator,
             heard,
             done: Cell::new(0),
         };

@@ -15,13 +15,13 @@ use super::as_written::AsWritten;
 use super::decision::{Decision, decide, noisier};
 use super::note::Note;
 use super::rejected::{Reason, Rejected};
-use super::rows::{ForceErrors, FreeParameters, RowFigure, Rows, Session};
-use super::{Heard, singular};
+use super::rows::{ForceErrors, Rows, Session};
+use super::{Calibrator, Heard};
 use crate::effects::fitted::FittedEffect;
 use crate::effects::removal::remove;
 use crate::fit::Fit;
 use crate::prepared::Prepared;
-use crate::quantity::Sensor;
+use crate::quantity::{Figure, Sensor};
 use mimu_recording::error::Result;
 
 /// Most times that the rows of a sensor are made.
@@ -100,13 +100,12 @@ impl Pass {
     /// Effects of the sensor's own input, about which rows are linearised if they are not linear in the readings. On a table the input is
     /// known, so there are none.
     fn about(&self) -> Vec<FittedEffect> {
-        match self.rows.figure {
-            RowFigure::Input | RowFigure::Rest => Vec::new(),
-            RowFigure::Magnitude | RowFigure::Direction => {
-                let found = self.found.iter().filter(|e| e.is_of_own_input());
-                found.cloned().collect()
-            }
-        }
+        let is_linear = self.rows.observable.figure() == Figure::Input;
+        let found = self
+            .found
+            .iter()
+            .filter(|e| !is_linear && e.is_of_own_input());
+        found.cloned().collect()
     }
 
     /// Whether `other` has the same effects, and readings without them can be calibrated. If it is linearised about the effects found here,
@@ -133,17 +132,9 @@ pub(super) struct Passes<'a> {
     pub now: &'a Fit,
     /// The later ones.
     pub later: &'a [Prepared],
-    /// Number of recordings in which effects are sought; the others judge the effects.
-    pub found_in: usize,
     /// Errors of the forces that turns are judged by.
     pub forces: Option<&'a ForceErrors>,
-    pub free: FreeParameters<'a>,
-    /// See [`super::Recordings::accept`].
-    pub accept: &'a [String],
-    pub calibrate: &'a dyn Fn(Prepared) -> Result<Fit>,
-    /// The same with parts of the recording held out.
-    pub hold_out: &'a dyn Fn(Prepared) -> Result<Fit>,
-    pub place: &'a str,
+    pub calibrator: &'a Calibrator<'a>,
     /// Told the share of the search that is done.
     pub heard: Heard<'a>,
     /// Passes so far.
@@ -157,8 +148,7 @@ impl Passes<'_> {
             sensor: self.sensor,
             before: self.now,
             others: self.later,
-            calibrate: self.calibrate,
-            hold_out: self.hold_out,
+            calibrator: self.calibrator,
         };
         let mut without = Vec::new();
         loop {
@@ -239,7 +229,7 @@ impl Passes<'_> {
         models: &[Option<Affine<f64>>; 2],
         effects: &[FittedEffect],
     ) -> Option<Rows> {
-        let as_read = Rows::of(sessions, self.sensor, self.free)?;
+        let as_read = Rows::of(sessions, self.sensor, self.calibrator.free(self.sensor))?;
         if effects.is_empty() {
             return Some(as_read);
         }
@@ -254,7 +244,7 @@ impl Passes<'_> {
                 },
             )
             .collect();
-        let rows = Rows::of(&sessions, self.sensor, self.free)?;
+        let rows = Rows::of(&sessions, self.sensor, self.calibrator.free(self.sensor))?;
         Some(rows.about(effects, &as_read).unwrap_or(as_read))
     }
 
@@ -267,24 +257,26 @@ impl Passes<'_> {
         without: &[Rejected],
     ) -> Result<Pass> {
         let sensor = self.sensor;
+        // The others judge the effects.
+        let found_in = 1 + self.calibrator.recordings.more.len();
         let head = Session {
             forces: self.forces,
             ..Session::of(&self.now.prepared, models)
         };
         let others = self.later.iter().map(|p| Session::later(p, &models));
         let sessions: Vec<Session> = std::iter::once(head).chain(others).collect();
-        let (ours, unseen) = sessions.split_at(self.found_in);
+        let (ours, unseen) = sessions.split_at(found_in);
         let rows = self.rows(ours, &models, about);
-        let rows = rows.ok_or_else(|| singular(self.place))?;
+        let rows = rows.ok_or_else(|| self.calibrator.singular())?;
         let unseen = self.rows(unseen, &models, about);
         let all: Vec<&Prepared> = ours.iter().map(|s| s.prepared).collect();
         let (ends, of) = dwell_ends(&all);
         let decide = |without: &[Rejected]| {
             let done = self.done.get();
             let heard = |share: f64| (self.heard)(share_of(f64::from(done) + share));
-            let decision = decide(&rows, &ends, unseen.as_ref(), without, self.accept, &heard);
+            let decision = decide(&rows, &ends, unseen.as_ref(), without, &heard);
             self.done.set(done + 1);
-            decision.ok_or_else(|| singular(self.place))
+            decision.ok_or_else(|| self.calibrator.singular())
         };
         let clean = |found: &[FittedEffect]| -> Result<(Fit, Vec<Prepared>)> {
             let lasting: Vec<FittedEffect> = found.iter().map(FittedEffect::lasting).collect();
@@ -293,16 +285,16 @@ impl Passes<'_> {
             let clean = |(k, s): (usize, &Session)| {
                 let effects = match k {
                     0 => found,
-                    k if k < self.found_in => &lasting,
+                    k if k < found_in => &lasting,
                     _ => &of_unit,
                 };
                 remove(s.prepared, s.gyro.as_ref(), s.accel.as_ref(), effects)
-                    .ok_or_else(|| singular(self.place))
+                    .ok_or_else(|| self.calibrator.singular())
             };
             let cleaned = sessions.iter().enumerate().map(clean);
             let mut cleaned: Vec<Prepared> = cleaned.collect::<Result<_>>()?;
             let first = cleaned.remove(0);
-            Ok(((self.calibrate)(first)?, cleaned))
+            Ok((self.calibrator.calibrate(first)?, cleaned))
         };
         let mut decision = decide(without)?;
         let mut found = effects_of(&decision);

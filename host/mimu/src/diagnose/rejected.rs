@@ -51,8 +51,8 @@ pub enum Reason {
     FitsNoise([f64; 2]),
     /// One dwell and those in its pose contain the evidence: the probability by chance without them.
     LostWithDwell(f64),
-    /// It lowers the held-out error, but has no known physics, and neither a second recording nor the user confirms it: the
-    /// probability by chance.
+    /// It lowers the held-out error, but has no known physics, and no second recording confirms it: the probability by
+    /// chance.
     Suggestion(f64),
     /// A bias that walks at random explains the rows as well: the probability by chance beside such a walk.
     RandomWalk(f64),
@@ -75,8 +75,6 @@ pub struct NotChosen {
     pub p: f64,
     /// Why it was not chosen although it is significant now; `None` if it is not.
     pub why: Option<Passed>,
-    /// Errors in sample and held out, where both are known.
-    pub errors: Option<[[ErrorRms; 2]; 2]>,
 }
 
 /// Why an effect that is significant was not chosen.
@@ -149,7 +147,7 @@ impl fmt::Display for Reason {
             ),
             Self::Suggestion(p) => write!(
                 f,
-                "{}, and it lowers the held-out error, but no known physics explains it: a suggestion. Confirm it by a second recording that shows it, or accept it",
+                "{}, and it lowers the held-out error, but no known physics explains it: a suggestion. Confirm it by a second recording that shows it",
                 p_value(*p)
             ),
             Self::NotChosen(one) => write!(f, "{one}"),
@@ -192,10 +190,7 @@ impl fmt::Display for NotChosen {
             }
             None => {}
         }
-        match &self.errors {
-            Some([[a, b], [c, d]]) => write!(f, "; in sample {a} to {b}, held out {c} to {d}"),
-            None => Ok(()),
-        }
+        Ok(())
     }
 }
 
@@ -203,7 +198,7 @@ impl ErrorRms {
     /// Of the judged `rows`.
     pub(super) fn of(rows: &Rows, rms: f64) -> Self {
         Self {
-            figure: rows.figure.into(),
+            figure: rows.observable.figure(),
             sensor: rows.sensor,
             rms,
         }

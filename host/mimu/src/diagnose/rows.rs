@@ -12,8 +12,8 @@
 //! Several recordings share one matrix, but each has separate biases: a bias changes at every power-on, which must not be mistaken for an effect.
 
 mod build;
+mod factors;
 mod forces;
-mod gravity;
 mod join;
 mod known;
 mod terms;
@@ -34,9 +34,8 @@ pub use forces::ForceErrors;
 use terms::Quantities;
 
 use crate::fit::session_bias;
-use crate::observable::StratumName;
+use crate::observable::{Observable, StratumName};
 use crate::prepared::Prepared;
-use crate::quantity;
 use crate::quantity::Sensor;
 use crate::triad::Covariance;
 
@@ -45,8 +44,6 @@ use crate::triad::Covariance;
 pub struct Stratum {
     /// Quantity of its rows.
     pub name: StratumName,
-    /// Axis, if all of its rows belong to one.
-    pub axis: Option<usize>,
     /// Index of its recording.
     pub session: usize,
     /// Its rows.
@@ -65,31 +62,6 @@ pub struct Stratum {
     pub random_walk: Option<DMatrix<f64>>,
     /// Whether the known covariance includes the wander of the bias.
     pub wander_known: bool,
-    /// Whether its rows show how the reading follows an input that moves within a dwell, instead of dwell means.
-    pub within: bool,
-}
-
-/// Quantity that error figures are about.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum RowFigure {
-    /// Error of a known input, SI.
-    Input,
-    /// Magnitude of the specific force minus gravity, m/s².
-    Magnitude,
-    /// Direction of gravity predicted by a turn, rad.
-    Direction,
-    /// Rate at rest, rad/s.
-    Rest,
-}
-
-impl From<RowFigure> for quantity::Figure {
-    fn from(figure: RowFigure) -> Self {
-        match figure {
-            RowFigure::Input | RowFigure::Rest => Self::Input,
-            RowFigure::Magnitude => Self::GravityMagnitude,
-            RowFigure::Direction => Self::Direction,
-        }
-    }
 }
 
 /// Affine parameters that the recordings themselves determine.
@@ -138,6 +110,29 @@ fn row_variances(factor: &DMatrix<f64>) -> DVector<f64> {
 }
 
 impl Stratum {
+    /// Rows with independent errors of these variances.
+    fn independent(observable: Observable, rows: Range<usize>, variances: DVector<f64>) -> Self {
+        Self {
+            name: StratumName(observable, None),
+            session: 0,
+            rows,
+            known: DMatrix::from_diagonal(&variances),
+            by_reference: None,
+            by_earth: None,
+            open: None,
+            random_walk: None,
+            wander_known: true,
+        }
+    }
+
+    /// Axis, if all of its rows are means of one.
+    pub fn axis(&self) -> Option<usize> {
+        match self.name.0 {
+            Observable::Axis(axis) | Observable::AtRest(axis) => Some(axis),
+            _ => None,
+        }
+    }
+
     /// Known variance of its rows, unit of the rows squared.
     pub fn known_variances(&self) -> DVector<f64> {
         let known = self.known.diagonal();
@@ -155,12 +150,6 @@ impl Stratum {
             }
             _ => Cow::Borrowed(&self.known),
         }
-    }
-
-    /// Whether its rows are independent, apart from the errors that all share and a random walk.
-    pub fn is_independent(&self) -> bool {
-        let count = self.known.nrows();
-        (0..count).all(|j| (0..count).all(|i| i == j || self.known[(i, j)] == 0.0))
     }
 }
 
@@ -225,8 +214,8 @@ pub struct Rows {
     pub strata: Vec<Stratum>,
     /// Whether the vertical component of the Earth's rate is to be found: by hand without a latitude. On a table without one it is in the covariance.
     pub earth_unknown: bool,
-    /// What the error figures are about.
-    pub figure: RowFigure,
+    /// What the rows that error figures include observe.
+    pub observable: Observable,
     /// Number of rows, from the first on, that the error figures include; and how many of these count as one dwell or turn.
     pub judged: (usize, usize),
     rows: Vec<Row>,
@@ -259,7 +248,7 @@ impl Rows {
             .enumerate()
             .filter_map(|(i, s)| Some((i, build::part(s, sensor, free)?)))
             .collect();
-        let mut rows = join::join(sensor, parts, sessions.len())?;
+        let mut rows = join::join(sensor, &parts, sessions.len())?;
         if let FreeParameters::Bias(Some(covariance)) = free {
             rows.leave_open(covariance.fixed_view::<9, 9>(0, 0).into_owned());
         }
@@ -320,7 +309,9 @@ impl Rows {
 
     /// Three rows for each pose of a recording: the error of the force that its accelerometer measures.
     pub(super) fn forces(session: &Session) -> Option<Self> {
-        join::join(Sensor::Accel, vec![(0, build::forces(session)?)], 1)
+        let mut part = build::Part::of(session, Sensor::Accel)?;
+        part.add_forces();
+        join::join(Sensor::Accel, &[(0, part)], 1)
     }
 
     /// Dwells of row `row`, counted through all recordings: a turn begins in the first and ends in the second; otherwise both are the same.
@@ -331,7 +322,7 @@ impl Rows {
     /// For each dwell the first dwell in the same pose of the same recording, by the direction of gravity. If the unit was placed badly, all of these
     /// err alike, so they count as one witness. Each dwell is a separate witness on a table, whose input is known, and if there is only one pose.
     pub fn witnesses(&self) -> Vec<usize> {
-        if self.figure == RowFigure::Input {
+        if self.is_of_known_inputs() {
             return (0..self.dwell_count()).collect();
         }
         let mut ups = vec![Vector3::repeat(f64::NAN); self.dwell_count()];
@@ -349,12 +340,17 @@ impl Rows {
         }
     }
 
+    /// Whether the inputs are known.
+    pub fn is_of_known_inputs(&self) -> bool {
+        matches!(self.observable, Observable::Axis(_))
+    }
+
     /// Number of judged rows that show how the reading follows an input that moves within a dwell.
     pub fn judged_within(&self) -> usize {
         let within = self
             .strata
             .iter()
-            .filter(|s| s.within && s.rows.end <= self.judged.0);
+            .filter(|s| matches!(s.name.0, Observable::Within(_)) && s.rows.end <= self.judged.0);
         within.map(|s| s.rows.len()).sum()
     }
 

@@ -9,7 +9,9 @@ mod forward;
 mod refine;
 mod screen;
 
-use nalgebra::DMatrix;
+use std::ops::Range;
+
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
@@ -20,6 +22,7 @@ use crate::effects::candidate::{Candidate, CandidateKind};
 use crate::effects::effect::Effect;
 use crate::effects::quantity::Conditions;
 use chosen::score;
+pub(super) use chosen::without;
 pub use chosen::{Alternative, COEFFICIENT, Chosen};
 use refine::{Beside, With};
 use screen::Screened;
@@ -142,20 +145,28 @@ impl<'a> Search<'a> {
         self.by_dwell.conditions_without(&left)
     }
 
+    /// The columns of each of the chosen among those of the [model](Self::model).
+    pub(super) fn places(&self, chosen: &[Chosen]) -> Vec<Range<usize>> {
+        let counts = chosen.iter().map(|one| one.columns.ncols());
+        let places = counts.scan(self.basis.ncols(), |end, count| {
+            *end += count;
+            Some(*end - count..*end)
+        });
+        places.collect()
+    }
+
+    /// The coefficients of each of the chosen.
+    pub(super) fn coefficients(&self, chosen: &[Chosen], fit: &Fitted) -> Vec<DVector<f64>> {
+        let places = self.places(chosen).into_iter();
+        let each = places.map(|of| fit.coefficients.rows_range(of).into_owned());
+        each.collect()
+    }
+
     /// The prior of the coefficients of the chosen: column of the [model](Self::model), and standard deviation.
     pub(super) fn prior(&self, chosen: &[Chosen]) -> Vec<(usize, f64)> {
-        let mut column = self.basis.ncols();
-        let mut all = Vec::new();
-        for one in chosen {
-            let columns = column..column + one.columns.ncols();
-            column = columns.end;
-            all.extend(
-                one.size
-                    .into_iter()
-                    .flat_map(|size| columns.clone().map(move |k| (k, size))),
-            );
-        }
-        all
+        let each = chosen.iter().zip(self.places(chosen));
+        let each = each.flat_map(|(one, columns)| columns.map(|k| Some((k, one.size?))));
+        each.flatten().collect()
     }
 
     /// The axes of a chosen nonlinearity stay together, as one law acts on all. The search chooses those that its score can pay for; with the others at
@@ -165,10 +176,7 @@ impl<'a> Search<'a> {
         let CandidateKind::Effect(effect) = chosen[k].candidate.kind else {
             return;
         };
-        let first: usize = chosen[..k].iter().map(|c| c.columns.ncols()).sum();
-        let own = now
-            .coefficients
-            .rows(self.basis.ncols() + first, chosen[k].columns.ncols());
+        let own = now.coefficients.rows_range(self.places(chosen)[k].clone());
         let typical = effect.coefficients.iter().map(|c| c.typical);
         let size = typical
             .chain(own.iter().map(|v| v.abs()))
@@ -203,7 +211,7 @@ impl<'a> Search<'a> {
                 continue;
             };
             let mut more = before.candidate.siblings();
-            let first: usize = chosen[..k].iter().map(|c| c.columns.ncols()).sum();
+            let first = self.places(chosen)[k].start;
             while !more.is_empty() {
                 let one = &mut chosen[k];
                 one.candidate.active = [&before.candidate.active[..], &more[..]].concat();
@@ -213,7 +221,7 @@ impl<'a> Search<'a> {
                 let fit = self.fit(chosen);
                 let open = fit.as_ref().map(|fit| {
                     let sigma = |at: usize| {
-                        let place = self.basis.ncols() + first + at;
+                        let place = first + at;
                         fit.covariance[(place, place)].sqrt()
                     };
                     let ratio = |k: &usize| {

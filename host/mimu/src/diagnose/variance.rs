@@ -8,20 +8,15 @@ mod walk;
 use nalgebra::{Cholesky, DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::rows::Rows;
+use super::rows::{Rows, Stratum};
 use factor::{Axes, Factor, Separable};
 
-pub use factor::{DecorrelatedChoice, Whitener};
+pub use factor::Whitener;
 pub use walk::CommonWalk;
 
-/// Variance components of each stratum beside the known covariance.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Components {
-    /// Extra white variance of each row, unit of the rows squared.
-    pub extra_white: Vec<f64>,
-    /// K² of a random walk, unit²/s.
-    pub random_walk: Vec<f64>,
-}
+/// Variance components of each stratum beside the known covariance: the extra white variance of each row, unit of the rows squared, and K² of a random
+/// walk, unit²/s.
+pub type Components = Vec<[f64; 2]>;
 
 /// A linear model of the rows at some components.
 #[derive(Debug, Clone)]
@@ -79,6 +74,8 @@ pub struct VarianceModel<'a> {
     /// Axes in which the rows of a stratum without a random walk are independent, whatever the extra white variance. Where a random walk is sought,
     /// only the rows' own axes serve; `None` if the rows are not independent in these.
     axes: Vec<Option<Axes>>,
+    /// Whether the rows of a stratum are independent, apart from the errors that all share and a random walk.
+    independent: Vec<bool>,
     /// Factor of the covariance by the errors that all rows share, in these axes. In a small stratum the axes contain it.
     open: Vec<Option<DMatrix<f64>>>,
     /// The random walk that is sought in each stratum, if its covariance is separable.
@@ -97,6 +94,7 @@ impl<'a> VarianceModel<'a> {
             rows,
             all_random_walks,
             axes: Vec::new(),
+            independent: Vec::new(),
             open: Vec::new(),
             separable: Vec::new(),
             typical: rows
@@ -108,6 +106,8 @@ impl<'a> VarianceModel<'a> {
                 })
                 .collect(),
         };
+        let independent = |s: &Stratum| Axes::as_they_stand(&s.known).is_some();
+        variance.independent = rows.strata.iter().map(independent).collect();
         variance.axes = (0..rows.strata.len())
             .into_par_iter()
             .map(|s| match variance.seeks_random_walk(s) {
@@ -160,11 +160,7 @@ impl<'a> VarianceModel<'a> {
 
     /// Zero components: the known noise alone.
     pub fn none(&self) -> Components {
-        let zeros = vec![0.0; self.rows.strata.len()];
-        Components {
-            extra_white: zeros.clone(),
-            random_walk: zeros,
-        }
+        vec![[0.0; 2]; self.rows.strata.len()]
     }
 
     /// Variance of each row.
@@ -177,60 +173,45 @@ impl<'a> VarianceModel<'a> {
                     .random_walk
                     .as_ref()
                     .map_or(0.0, |unit| unit[(i, i)]);
-                out[row] = known[i]
-                    + at.extra_white[s]
-                    + at.random_walk[s] * random_walk
-                    + 1e-12 * self.typical[s].0;
+                let [extra_white, k2] = at[s];
+                out[row] = known[i] + extra_white + k2 * random_walk + self.floor(s);
             }
         }
         out
     }
 
+    /// Variance that every row has at least, so that readings without noise have a covariance.
+    fn floor(&self, s: usize) -> f64 {
+        1e-12 * self.typical[s].0
+    }
+
     /// Factor of the covariance of stratum `s`, for rows that have been rotated.
-    fn factor(&self, s: usize, extra_white: f64, random_walk: f64) -> Option<Factor> {
-        let noise = self.factor_of_noise(s, extra_white, random_walk)?;
+    fn factor(&self, s: usize, at: [f64; 2]) -> Option<Factor> {
+        let noise = match &self.axes[s] {
+            Some(axes) if at[1] == 0.0 => axes.factor(at[0], self.floor(s)),
+            _ => {
+                let all: Vec<usize> = (0..self.rows.strata[s].rows.len()).collect();
+                self.noise_of(s, at, &all)?
+            }
+        };
         match &self.open[s] {
             Some(open) => noise.beside(open),
             None => Some(noise),
         }
     }
 
-    /// The same without the errors that all rows share, unless the axes contain them.
-    fn factor_of_noise(&self, s: usize, extra_white: f64, random_walk: f64) -> Option<Factor> {
-        let stratum = &self.rows.strata[s];
-        let floor = 1e-12 * self.typical[s].0;
-        if let Some(axes) = &self.axes[s]
-            && random_walk == 0.0
-        {
-            return Some(axes.factor(extra_white, floor));
-        }
-        if let (Some(axes), Some(separable)) = (&self.axes[s], &self.separable[s])
-            && let Some(known) = axes.standing()
-        {
-            return separable.factor(random_walk, &known.map(|v| v.max(floor) + extra_white));
-        }
-        let mut v = stratum.known.clone();
-        if let Some(unit) = &stratum.random_walk {
-            v += unit * random_walk;
-        }
-        for i in 0..v.nrows() {
-            v[(i, i)] += extra_white + floor;
-        }
-        Cholesky::new(v).map(Factor::Full)
-    }
-
     /// Decorrelates all rows.
     pub fn whitener(&self, at: &Components) -> Option<Whitener<'_>> {
-        let factors = (0..self.rows.strata.len())
-            .map(|s| self.factor(s, at.extra_white[s], at.random_walk[s]));
+        let strata = self.rows.strata.iter().enumerate();
+        let parts = strata.map(|(s, stratum)| Some((stratum.rows.clone(), self.factor(s, at[s])?)));
         Some(Whitener {
-            variance: self,
-            factors: factors.collect::<Option<_>>()?,
+            rotation: Some(self),
+            parts: parts.collect::<Option<_>>()?,
         })
     }
 
     /// Decorrelates the rows `kept`, given in ascending order, without the others.
-    pub fn kept(&self, at: &Components, kept: &[usize]) -> Option<DecorrelatedChoice> {
+    pub fn kept(&self, at: &Components, kept: &[usize]) -> Option<Whitener<'_>> {
         let mut parts = Vec::new();
         for (s, stratum) in self.rows.strata.iter().enumerate() {
             let from = kept.partition_point(|r| *r < stratum.rows.start);
@@ -242,14 +223,17 @@ impl<'a> VarianceModel<'a> {
             if rows.is_empty() {
                 continue;
             }
-            let noise = self.noise_of(s, [at.extra_white[s], at.random_walk[s]], &rows)?;
+            let noise = self.noise_of(s, at[s], &rows)?;
             let factor = match &stratum.open {
                 Some(open) => noise.beside(&open.select_rows(&rows))?,
                 None => noise,
             };
             parts.push((from..to, factor));
         }
-        Some(DecorrelatedChoice { parts })
+        Some(Whitener {
+            rotation: None,
+            parts,
+        })
     }
 
     /// Factor of the noise of some `rows` of stratum `s`, not rotated.
@@ -260,12 +244,12 @@ impl<'a> VarianceModel<'a> {
         rows: &[usize],
     ) -> Option<Factor> {
         let stratum = &self.rows.strata[s];
-        let added = extra_white + 1e-12 * self.typical[s].0;
+        let added = extra_white + self.floor(s);
         let separable = match random_walk > 0.0 {
             true => self.separable[s].as_ref().map(|w| w.of_rows(rows)),
             false => None,
         };
-        if stratum.is_independent() && (random_walk == 0.0 || separable.is_some()) {
+        if self.independent[s] && (random_walk == 0.0 || separable.is_some()) {
             let variances = rows.iter().map(|i| stratum.known[(*i, *i)] + added);
             let variances = DVector::from_iterator(rows.len(), variances);
             return match separable {
@@ -283,16 +267,10 @@ impl<'a> VarianceModel<'a> {
         Cholesky::new(v).map(Factor::Full)
     }
 
-    fn stratum(
-        &self,
-        s: usize,
-        extra_white: f64,
-        random_walk: f64,
-        both: &DMatrix<f64>,
-    ) -> Option<NormalEquations> {
+    fn stratum(&self, s: usize, at: [f64; 2], both: &DMatrix<f64>) -> Option<NormalEquations> {
         let range = &self.rows.strata[s].rows;
         let mut part = both.rows(range.start, range.len()).into_owned();
-        let factor = self.factor(s, extra_white, random_walk)?;
+        let factor = self.factor(s, at)?;
         factor.whiten(&mut part);
         Some(NormalEquations {
             normal: part.tr_mul(&part),
@@ -309,17 +287,6 @@ impl<'a> VarianceModel<'a> {
             logs += stratum.log_determinant;
         }
         let y2 = normal[(p, p)];
-        if p == 0 {
-            return Some(Fitted {
-                components: at.clone(),
-                deviance: logs + y2,
-                restricted: logs + y2,
-                coefficients: DVector::zeros(0),
-                covariance: DMatrix::zeros(0, 0),
-                chi2: y2,
-                prior: Vec::new(),
-            });
-        }
         // Scaled, because the units of columns differ widely.
         let scale = DVector::from_fn(p, |i, _| normal[(i, i)].sqrt().max(f64::MIN_POSITIVE));
         let scaled = DMatrix::from_fn(p, p, |i, j| normal[(i, j)] / (scale[i] * scale[j]));
@@ -358,7 +325,7 @@ impl<'a> VarianceModel<'a> {
     pub fn fit_at(&self, columns: &DMatrix<f64>, at: &Components) -> Option<Fitted> {
         let both = self.both(columns);
         let strata: Option<Vec<NormalEquations>> = (0..self.rows.strata.len())
-            .map(|s| self.stratum(s, at.extra_white[s], at.random_walk[s], &both))
+            .map(|s| self.stratum(s, at[s], &both))
             .collect();
         self.solve(&strata?, at)
     }
@@ -377,7 +344,7 @@ impl<'a> VarianceModel<'a> {
         let both = self.both(columns);
         let mut at = start.clone();
         let mut strata: Vec<NormalEquations> = (0..self.rows.strata.len())
-            .map(|s| self.stratum(s, at.extra_white[s], at.random_walk[s], &both))
+            .map(|s| self.stratum(s, at[s], &both))
             .collect::<Option<_>>()?;
         let mut best = self.solve(&strata, &at)?;
         for _ in 0..SWEEPS {
@@ -385,10 +352,8 @@ impl<'a> VarianceModel<'a> {
             for s in 0..strata.len() {
                 let (row, unit_random_walk) = self.typical[s];
                 for part in 0..if self.seeks_random_walk(s) { 2 } else { 1 } {
-                    let (now, unit) = match part {
-                        0 => (at.extra_white[s], row),
-                        _ => (at.random_walk[s], row / unit_random_walk),
-                    };
+                    let now = at[s][part];
+                    let unit = [row, row / unit_random_walk][part];
                     let mut steps: Vec<f64> = vec![0.0];
                     match now > 0.0 {
                         true => steps.extend([0.25, 0.5, 0.8, 1.25, 2.0, 4.0].map(|f| f * now)),
@@ -396,28 +361,22 @@ impl<'a> VarianceModel<'a> {
                             steps.extend([0.1, 0.5, 2.0, 8.0, 64.0, 1e3, 1e5].map(|f| f * unit))
                         }
                     }
-                    let with = |value: f64| match part {
-                        0 => (value, at.random_walk[s]),
-                        _ => (at.extra_white[s], value),
-                    };
                     // In parallel: decorrelating a stratum takes nearly all of the time, and the values do not depend on each other.
-                    let tried: Vec<((f64, f64), Option<NormalEquations>)> = steps
+                    let tried: Vec<([f64; 2], Option<NormalEquations>)> = steps
                         .into_par_iter()
                         .map(|value| {
-                            let (extra_white, random_walk) = with(value);
-                            (
-                                (extra_white, random_walk),
-                                self.stratum(s, extra_white, random_walk, &both),
-                            )
+                            let mut levels = at[s];
+                            levels[part] = value;
+                            (levels, self.stratum(s, levels, &both))
                         })
                         .collect();
-                    for ((extra_white, random_walk), stratum) in tried {
+                    for (levels, stratum) in tried {
                         let Some(new) = stratum else {
                             continue;
                         };
                         let old = std::mem::replace(&mut strata[s], new);
                         let mut there = at.clone();
-                        (there.extra_white[s], there.random_walk[s]) = (extra_white, random_walk);
+                        there[s] = levels;
                         match self.solve(&strata, &there) {
                             Some(found) if cost(&found) < cost(&best) - 1e-9 => {
                                 best = found;

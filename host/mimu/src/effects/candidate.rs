@@ -1,5 +1,7 @@
 //! An effect, a product found from the data or a jump of a bias, with the choice of its coefficients.
 
+use std::borrow::Cow;
+
 use nalgebra::Vector3;
 
 use super::effect::{Coefficient, Effect, NonlinearParameter, Role, Scope};
@@ -25,6 +27,19 @@ pub enum CandidateKind {
         /// Time, s since it began.
         t_s: f64,
     },
+}
+
+impl CandidateKind {
+    /// Its coefficients; a product and a jump have one, whose size no data sheet gives.
+    pub fn coefficients(&self) -> Cow<'static, [Coefficient]> {
+        let (axis, regressor) = match *self {
+            Self::Effect(effect) => return Cow::Borrowed(effect.coefficients),
+            Self::Term(axis, product) => (axis, Regressor::Product(product)),
+            Self::Jump { axis, session, t_s } => (axis, Regressor::Since { session, t_s }),
+        };
+        let one = Coefficient::of(axis, AXES[axis], regressor, f64::NAN);
+        Cow::Owned(vec![one])
+    }
 }
 
 /// An effect, a product or a jump that a search tries.
@@ -107,17 +122,12 @@ impl Candidate {
 
     /// A candidate with all coefficients except those specific to the recording.
     pub fn new(sensor: Sensor, kind: CandidateKind) -> Self {
-        let active = match &kind {
-            CandidateKind::Effect(e) => {
-                let lasting = |k: &usize| e.coefficients[*k].scope != Scope::Recording;
-                (0..e.coefficients.len()).filter(lasting).collect()
-            }
-            CandidateKind::Term(..) | CandidateKind::Jump { .. } => vec![0],
-        };
+        let all = kind.coefficients();
+        let lasting = |k: &usize| all[*k].scope != Scope::Recording;
         Self {
             sensor,
+            active: (0..all.len()).filter(lasting).collect(),
             kind,
-            active,
             without_self_heating: false,
             excited: Vec::new(),
             inseparable: Vec::new(),
@@ -126,14 +136,26 @@ impl Candidate {
         }
     }
 
+    /// An effect in the place of this one: on the same axes, if it has separate coefficients for these, and following the same temperature.
+    pub fn replaced_by(&self, effect: &'static Effect) -> Self {
+        let axes = self.axes();
+        let mut other = Self::new(self.sensor, CandidateKind::Effect(effect));
+        let of_axes = |k: &usize| {
+            effect.coefficients[*k]
+                .axis
+                .is_none_or(|a| axes.contains(&a))
+        };
+        other.active.retain(of_axes);
+        other.without_self_heating = self.without_self_heating;
+        other
+    }
+
     /// Coefficients specific to the recording, for the axes that have an active coefficient.
     pub(crate) fn of_recording(&self) -> Vec<usize> {
-        let CandidateKind::Effect(e) = &self.kind else {
-            return Vec::new();
-        };
-        let is_active = |axis| self.active.iter().any(|k| e.coefficients[*k].axis == axis);
-        let all = e.coefficients.iter().enumerate();
-        all.filter(|(_, c)| c.scope == Scope::Recording && is_active(c.axis))
+        let all = self.kind.coefficients();
+        let is_active = |axis| self.active.iter().any(|k| all[*k].axis == axis);
+        let each = all.iter().enumerate();
+        each.filter(|(_, c)| c.scope == Scope::Recording && is_active(c.axis))
             .map(|(k, _)| k)
             .collect()
     }
@@ -141,25 +163,21 @@ impl Candidate {
     /// The coefficient that `k` requires. A curvature requires the slope, because the temperature from which it counts is a convention. A coefficient
     /// specific to the recording requires the lasting one of its axis.
     pub(crate) fn rests_on(&self, k: usize) -> Option<usize> {
-        let CandidateKind::Effect(e) = &self.kind else {
-            return None;
-        };
-        let own = &e.coefficients[k];
+        let all = self.kind.coefficients();
+        let own = &all[k];
         let base = |other: &Coefficient| match own.scope {
             Scope::Recording => other.scope != Scope::Recording,
             _ => other.regressor.is_slope_of(&own.regressor),
         };
-        let mut all = e.coefficients.iter();
-        all.position(|other| other.axis == own.axis && base(other))
+        all.iter()
+            .position(|other| other.axis == own.axis && base(other))
     }
 
     /// Excited coefficients on other axes that correspond to an active one. What acts on one axis acts on the others too, so these are fitted with it
     /// even if they are small; without them the intervals of the calibration would be too narrow.
     pub fn siblings(&self) -> Vec<usize> {
-        let CandidateKind::Effect(e) = &self.kind else {
-            return Vec::new();
-        };
-        let like = |a: &usize, b: &usize| e.coefficients[*a].typical == e.coefficients[*b].typical;
+        let all = self.kind.coefficients();
+        let like = |a: &usize, b: &usize| all[*a].typical == all[*b].typical;
         let new = self.excited.iter().filter(|k| !self.active.contains(k));
         new.filter(|k| self.active.iter().any(|a| like(a, k)))
             .copied()
@@ -169,34 +187,25 @@ impl Candidate {
     /// Penalty for coefficients `values` beyond data-sheet size, in units of the deviance. Sizes are assumed log-normal, with a factor of ten at two
     /// sigmas.
     pub(crate) fn unlikely(&self, values: &[f64]) -> f64 {
-        let CandidateKind::Effect(e) = &self.kind else {
-            return 0.0;
-        };
+        let all = self.kind.coefficients();
         let each = self.active.iter().zip(values).map(|(k, value)| {
-            let ratio = value.abs() / e.coefficients[*k].typical;
+            // A product found from the data has no size in data sheets: NaN, which max() drops.
+            let ratio = value.abs() / all[*k].typical;
             (2.0 * ratio.log10().max(0.0)).powi(2)
         });
         each.sum()
     }
 
-    /// Regressors of its active coefficients; none for a jump.
+    /// Regressors of its active coefficients.
     fn active_regressors(&self) -> Vec<Regressor> {
-        match &self.kind {
-            CandidateKind::Effect(e) => {
-                let each = self.active.iter().map(|k| e.coefficients[*k].regressor);
-                each.collect()
-            }
-            CandidateKind::Term(_, product) => vec![Regressor::Product(*product)],
-            CandidateKind::Jump { .. } => Vec::new(),
-        }
+        let all = self.kind.coefficients();
+        self.active.iter().map(|k| all[*k].regressor).collect()
     }
 
-    /// Regressor of each of its [slots](Self::slots); none for a jump.
+    /// Regressor of each of its [slots](Self::slots).
     pub fn slot_regressors(&self) -> Vec<Regressor> {
         let all = self.active_regressors();
-        let slots = self.slots();
-        let each = slots.iter().filter_map(|(k, _)| all.get(*k).copied());
-        each.collect()
+        self.slots().iter().map(|(k, _)| all[*k]).collect()
     }
 
     /// Whether it is a smooth nonlinearity of an axis: it depends only on the input along that axis.
@@ -227,10 +236,8 @@ impl Candidate {
 
     /// The candidate and the values of its coefficients, without those specific to a recording.
     pub fn lasting(&self, values: &[f64]) -> (Self, Vec<f64>) {
-        let CandidateKind::Effect(e) = &self.kind else {
-            return (self.clone(), values.to_vec());
-        };
-        let lasting = |(k, _): &(usize, f64)| e.coefficients[*k].scope != Scope::Recording;
+        let all = self.kind.coefficients();
+        let lasting = |(k, _): &(usize, f64)| all[*k].scope != Scope::Recording;
         let all = self.active.iter().copied().zip(values.iter().copied());
         let (active, values) = all.filter(lasting).unzip();
         let lasting = Self {
@@ -243,17 +250,11 @@ impl Candidate {
 
     /// For each of its regressors: the index of the coefficient among the active ones, and the axis.
     pub fn slots(&self) -> Vec<(usize, usize)> {
-        match &self.kind {
-            CandidateKind::Effect(e) => {
-                let axes = self.active.iter().map(|k| e.coefficients[*k].axis);
-                let slots = axes.enumerate().flat_map(|(at, axis)| match axis {
-                    Some(axis) => vec![(at, axis)],
-                    None => (0..3).map(|axis| (at, axis)).collect(),
-                });
-                slots.collect()
-            }
-            CandidateKind::Term(axis, _) | CandidateKind::Jump { axis, .. } => vec![(0, *axis)],
-        }
+        let all = self.kind.coefficients();
+        let axes = self.active.iter().map(|k| all[*k].axes());
+        let slots = axes.enumerate();
+        let slots = slots.flat_map(|(at, axes)| axes.map(move |axis| (at, axis)));
+        slots.collect()
     }
 
     /// Axis of each of its regressors.
@@ -279,42 +280,24 @@ impl Candidate {
 
     /// Name and unit of each of its active coefficients.
     pub fn names(&self) -> Vec<(String, String)> {
-        match &self.kind {
-            CandidateKind::Effect(e) => {
-                let of = |k: &usize| {
-                    let coefficient = &e.coefficients[*k];
-                    (coefficient.name.into(), coefficient.unit(self.sensor))
-                };
-                self.active.iter().map(of).collect()
-            }
-            CandidateKind::Term(axis, product) => {
-                vec![(AXES[*axis].into(), product.term_unit(self.sensor))]
-            }
-            CandidateKind::Jump { axis, .. } => {
-                vec![(AXES[*axis].into(), self.sensor.unit().into())]
-            }
-        }
+        let all = self.kind.coefficients();
+        let of = |k: &usize| {
+            let unit = match self.kind {
+                CandidateKind::Term(_, product) => product.term_unit(self.sensor),
+                _ => all[*k].unit(self.sensor),
+            };
+            (all[*k].name.into(), unit)
+        };
+        self.active.iter().map(of).collect()
     }
 
     /// Writes the values of its regressors under the conditions `at`, one for each slot.
     pub fn regressors(&self, at: &Conditions, parameter: f64, out: &mut [f64]) {
-        match &self.kind {
-            CandidateKind::Effect(e) => {
-                let mut out = out.iter_mut();
-                for k in &self.active {
-                    let Coefficient {
-                        axis, regressor, ..
-                    } = &e.coefficients[*k];
-                    let axes = axis.map_or(0..3, |axis| axis..axis + 1);
-                    for (axis, out) in axes.zip(&mut out) {
-                        *out = regressor.value(at, parameter, axis);
-                    }
-                }
-            }
-            CandidateKind::Term(axis, product) => out[0] = product.value(at, *axis),
-            CandidateKind::Jump { session, t_s, .. } => {
-                let since = at.session == *session && at.t_s >= *t_s;
-                out[0] = f64::from(u8::from(since));
+        let all = self.kind.coefficients();
+        let mut out = out.iter_mut();
+        for k in &self.active {
+            for (axis, out) in all[*k].axes().zip(&mut out) {
+                *out = all[*k].regressor.value(at, parameter, axis);
             }
         }
     }
@@ -330,8 +313,7 @@ impl Candidate {
 
     /// Whether it depends on temperature or time.
     pub fn is_slow(&self) -> bool {
-        let jumps = matches!(self.kind, CandidateKind::Jump { .. });
-        jumps || self.active_regressors().iter().any(Regressor::is_slow)
+        self.active_regressors().iter().any(Regressor::is_slow)
     }
 
     /// Whether it depends on the time since power-on.

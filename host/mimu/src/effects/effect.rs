@@ -109,6 +109,11 @@ impl Coefficient {
         Self { scope, ..self }
     }
 
+    /// The axes to whose readings it is added.
+    pub fn axes(&self) -> std::ops::Range<usize> {
+        self.axis.map_or(0..3, |axis| axis..axis + 1)
+    }
+
     /// SI unit in an error of `sensor`.
     pub fn unit(&self, sensor: Sensor) -> String {
         self.regressor.unit(sensor)
@@ -195,57 +200,5 @@ impl Effect {
             e if e.of_unit().all(|c| c.regressor.folds(e.sensor)) => OnDevice::Folded,
             _ => OnDevice::EverySample,
         }
-    }
-
-    /// Its line in the table of docs/effects.md.
-    pub fn table_line(&self) -> String {
-        let mut formulas: Vec<String> = Vec::new();
-        for c in self.coefficients {
-            // Coefficients of the axes with the same law share one formula; those of a matrix are distinguished by the other axis.
-            let formula = c.regressor.formula(None);
-            let formula = match c.scope {
-                Scope::Recording => {
-                    format!("{formula} (specific to the session: neither written nor removed)")
-                }
-                _ => formula,
-            };
-            if !formulas.contains(&formula) {
-                formulas.push(formula);
-            }
-        }
-        let parameter = self.parameter.map_or(String::new(), |p| {
-            format!("; τ from {} to {} s", p.from, p.to)
-        });
-        let mut units: Vec<String> = Vec::new();
-        for c in self.of_unit() {
-            let unit = c.unit(self.sensor);
-            if !units.contains(&unit) {
-                units.push(unit);
-            }
-        }
-        let of_place = self.coefficients.iter().map(|c| c.unit(self.sensor));
-        let unit = match units[..] {
-            [] => of_place.take(1).collect(),
-            _ => units.join(", "),
-        };
-        let device = match self.on_device() {
-            OnDevice::Never if self.is_error() => "never: it is specific to a session",
-            OnDevice::Never => "never: it is a true input",
-            OnDevice::EverySample => "with every sample",
-            OnDevice::Folded => "when temperature or time changes",
-        };
-        format!(
-            "| `{}` | {} | {}{parameter} | {} in {unit} | {} | {device} | {} | {} |",
-            self.id,
-            self.about,
-            formulas.join("; "),
-            self.coefficients
-                .iter()
-                .filter(|c| c.scope != Scope::Recording)
-                .count(),
-            self.size,
-            self.needs,
-            self.taken_for
-        )
     }
 }

@@ -152,27 +152,6 @@ impl Quantity {
         }
     }
 
-    /// `at` with another value of this quantity; unchanged if it is derived from several quantities, such as the vertical.
-    pub fn with(self, mut at: Conditions, axis: usize, value: f64) -> Conditions {
-        match self {
-            Self::Rate(i) => at.rate[i] = value,
-            Self::Force(i) => at.force[i] = value,
-            Self::Temperature => at.temperature_offset = value,
-            Self::TemperatureRate => {
-                at.lagged_temperature = at.temperature_offset - value * RATE_LAG_S;
-            }
-            Self::Time => at.on_s = value,
-            Self::SessionTime => at.from_middle_s = value,
-            Self::TemperatureLag => at.lagged_temperature = at.temperature_offset + value,
-            Self::RecordingTime => at.t_s = value,
-            Self::Input => at.sensed[axis] = value,
-            Self::InputAlong(i) => at.sensed[i] = value,
-            Self::AngularAcceleration(i) => at.angular_acceleration[i] = value,
-            Self::Up | Self::RateMagnitude => {}
-        }
-        at
-    }
-
     /// Name in the id of a term; `None` if terms do not contain it.
     pub fn name(self) -> Option<String> {
         Some(match self {
@@ -255,25 +234,6 @@ impl Quantity {
         }
     }
 
-    /// Symbol in formulas, in the error of sensor axis `axis`.
-    pub fn symbol(self, axis: Option<usize>) -> String {
-        let own = axis.map_or("i", |axis| AXES[axis]);
-        match self {
-            Self::Rate(i) => format!("ω_{}", AXES[i]),
-            Self::Force(i) => format!("f_{}", AXES[i]),
-            Self::Temperature => "ΔT".into(),
-            Self::TemperatureRate => "dT/dt".into(),
-            Self::Time | Self::SessionTime => "t".into(),
-            Self::TemperatureLag => "(T behind a lag - T)".into(),
-            Self::RecordingTime => "t in the first recording".into(),
-            Self::Input => format!("s_{own}"),
-            Self::InputAlong(i) => format!("s_{}", AXES[i]),
-            Self::AngularAcceleration(i) => format!("α_{}", AXES[i]),
-            Self::Up => format!("up_{own}"),
-            Self::RateMagnitude => "‖ω‖".into(),
-        }
-    }
-
     /// Name for people, in the error of axis `axis` of `sensor`.
     pub fn in_words(self, sensor: Sensor, axis: usize) -> String {
         let along = |i: usize| match sensor {
@@ -298,18 +258,14 @@ impl Quantity {
 
     /// Factor from SI to the unit that people read, and that unit.
     pub fn readable(self, sensor: Sensor) -> (f64, &'static str) {
-        const DPS: (f64, &str) = (180.0 / std::f64::consts::PI, "deg/s");
-        const IN_G: (f64, &str) = (1.0 / STANDARD_GRAVITY, "g");
-        match (self, sensor) {
-            (Self::Time | Self::SessionTime | Self::RecordingTime, _) => (1.0 / 60.0, "min"),
-            (Self::Rate(_) | Self::RateMagnitude, _) => DPS,
-            (Self::Force(_), _) => IN_G,
-            (Self::Input | Self::InputAlong(_), Sensor::Gyro) => DPS,
-            (Self::Input | Self::InputAlong(_), Sensor::Accel) => IN_G,
-            (Self::AngularAcceleration(_), _) => (DPS.0, "deg/s²"),
-            (Self::Temperature | Self::TemperatureLag, _) => (1.0, "K"),
-            (Self::TemperatureRate, _) => (60.0, "K/min"),
-            (Self::Up, _) => (1.0, "1"),
+        let degrees = 1f64.to_degrees();
+        match self.unit(sensor) {
+            "rad/s" => (degrees, "deg/s"),
+            "rad/s^2" => (degrees, "deg/s²"),
+            "m/s^2" => (1.0 / STANDARD_GRAVITY, "g"),
+            "s" => (1.0 / 60.0, "min"),
+            "K/s" => (60.0, "K/min"),
+            unit => (1.0, unit),
         }
     }
 }

@@ -157,20 +157,6 @@ impl Product {
         over("K", kelvins);
         unit
     }
-
-    fn formula(&self, axis: Option<usize>) -> String {
-        let each = self.parts().map(|(q, p)| {
-            let symbol = q.symbol(axis);
-            match p {
-                2 => format!("{symbol}²"),
-                3 => format!("{symbol}³"),
-                4 => format!("{symbol}⁴"),
-                5 => format!("{symbol}⁵"),
-                _ => symbol,
-            }
-        });
-        each.collect::<Vec<_>>().join(" ")
-    }
 }
 
 /// The function that an error of one axis is proportional to. The *parameter* is the nonlinear parameter of the effect.
@@ -186,6 +172,13 @@ pub enum Regressor {
     Decay(Quantity),
     /// ln(1 + quantity / parameter).
     Logarithm(Quantity),
+    /// 1 from a time of a recording on, 0 before and in the others.
+    Since {
+        /// Index of the recording.
+        session: usize,
+        /// Time, s since it began.
+        t_s: f64,
+    },
 }
 
 impl Regressor {
@@ -207,6 +200,9 @@ impl Regressor {
             Self::Absolute(q) => q.of(at, axis).abs(),
             Self::Decay(q) => (-q.of(at, axis) / parameter).exp(),
             Self::Logarithm(q) => (q.of(at, axis) / parameter).ln_1p(),
+            Self::Since { session, t_s } => {
+                f64::from(u8::from(at.session == *session && at.t_s >= *t_s))
+            }
         }
     }
 
@@ -218,6 +214,7 @@ impl Regressor {
             Self::Absolute(q) | Self::Decay(q) | Self::Logarithm(q) => {
                 [Some(Product::power(*q, 1)), None]
             }
+            Self::Since { .. } => [None; 2],
         }
     }
 
@@ -272,7 +269,7 @@ impl Regressor {
 
     /// Whether it depends on temperature or time.
     pub fn is_slow(&self) -> bool {
-        self.quantities().iter().any(|q| q.is_slow())
+        matches!(self, Self::Since { .. }) || self.quantities().iter().any(|q| q.is_slow())
     }
 
     /// Whether the device can fold it into a bias or a matrix: beside factors that change only with temperature and time it has at most one, an input
@@ -300,29 +297,7 @@ impl Regressor {
         match self {
             Self::Product(product) | Self::Sum(product, _) => product.unit(sensor),
             Self::Absolute(q) => Product::power(*q, 1).unit(sensor),
-            Self::Decay(_) | Self::Logarithm(_) => sensor.unit().into(),
-        }
-    }
-
-    /// Formula, in the error of sensor axis `axis`, or of each axis i.
-    pub fn formula(&self, axis: Option<usize>) -> String {
-        match self {
-            Self::Product(product) => product.formula(axis),
-            Self::Sum(a, b) => {
-                let signed = |first: bool, p: &Product| {
-                    let sign = match (first, p.sign < 0.0) {
-                        (true, true) => "-",
-                        (true, false) => "",
-                        (false, true) => " - ",
-                        (false, false) => " + ",
-                    };
-                    format!("{sign}{}", p.formula(axis))
-                };
-                format!("{}{}", signed(true, a), signed(false, b))
-            }
-            Self::Absolute(q) => format!("abs {}", q.symbol(axis)),
-            Self::Decay(q) => format!("exp(-{}/τ)", q.symbol(axis)),
-            Self::Logarithm(q) => format!("ln(1 + {}/τ)", q.symbol(axis)),
+            Self::Decay(_) | Self::Logarithm(_) | Self::Since { .. } => sensor.unit().into(),
         }
     }
 }

@@ -384,6 +384,30 @@ impl<'a> Factors<'a> {
         out
     }
 
+    /// The turns that a kind of factor is over, and the derivatives of each of its residuals by the rotation vectors of their increments, rad/rad, body frame.
+    /// `None` of one in a dwell, where an error of all readings is one of o.
+    pub fn by_increments(
+        &self,
+        kind: &Kind,
+        gyro: &Affine<f64>,
+    ) -> Option<(Range<usize>, Vec<Vec<Vector3<f64>>>)> {
+        match kind {
+            Kind::Turn(t, _) => {
+                let (_, by) = TurnError::with_increments(&self.turns[*t], gyro);
+                let side = |k: usize| by.iter().map(|by| by[k]).collect();
+                Some((*t..t + 1, vec![side(0), side(1)]))
+            }
+            Kind::Closure(closure, _) => {
+                let own = closure.turns.clone();
+                let by = ClosureError::by_increments(&self.turns[own.clone()], gyro);
+                Some((own, vec![by.unwrap_or_default().concat()]))
+            }
+            Kind::Magnitude { .. } | Kind::Rest(..) | Kind::Stated(..) | Kind::Population(..) => {
+                None
+            }
+        }
+    }
+
     /// Known variances of the residuals.
     pub fn variances(&self, values: &Values) -> Vec<f64> {
         let squared = PerSensor::from_fn(|sensor| {

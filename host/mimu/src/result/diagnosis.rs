@@ -9,7 +9,6 @@ use crate::diagnose::decision::{Accepted, Decision, Leftover, Undecided};
 use crate::diagnose::note::Note;
 use crate::diagnose::picture::Picture;
 use crate::diagnose::rejected::Rejected;
-use crate::diagnose::rows::RowFigure;
 use crate::diagnose::{Diagnosis, SensorDiagnosis, Source, Untestable, Verdict};
 use crate::fit::Split;
 use crate::judgement::Judgement;
@@ -139,8 +138,8 @@ pub struct SensorDiagnosisResult {
     pub dwells: usize,
     /// Why the others were not used, as a remark.
     pub not_used: String,
-    /// Data for its plots; `None` if a model is singular.
-    pub picture: Option<Picture>,
+    /// Data for its plots.
+    pub picture: Picture,
 }
 
 /// A sensor that the recordings cannot judge.
@@ -253,9 +252,9 @@ fn figures(d: &Diagnosis, found: &SensorDiagnosis) -> SensorDiagnosisResult {
     let fit = d.before.sensor(found.sensor);
     let figure = fit.map_or(Figure::Input, |f| f.figure);
     let (count, together) = found.rows.judged;
-    let of_one = match found.rows.figure {
-        RowFigure::Direction | RowFigure::Magnitude => together,
-        RowFigure::Input | RowFigure::Rest => 3 * together,
+    let of_one = match found.rows.observable.figure() {
+        Figure::Input => 3 * together,
+        _ => together,
     };
     let dwells = &d.before.prepared.dwells;
     SensorDiagnosisResult {

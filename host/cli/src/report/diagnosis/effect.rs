@@ -115,12 +115,11 @@ fn figure(a: &Accepted, picture: &Picture, panels: &[Panel]) -> Markup {
         div class="figures" { @for panel in panels { (figures::against(picture.sensor, panel)) } }
         figcaption {
             "Left: residuals plus the named part of the effect (its other parts and the other effects removed), against the "
-            "variable that it depends on, minus the part that the affine calibration absorbs (the mean, and the best straight line if the model is "
-            "linear in the variable). " (figures::key("fit", "M0 6H24")) "fitted effect with its 95 % band"
+            "variable that it depends on, minus the part that the affine calibration absorbs. " (figures::key("fit", "M0 6H24")) "fitted effect with its 95 % band"
             @if let Some(form) = a.effect.nonlinear_parameter() { " (for the " code { (form.name) } " found)" }
             ". Right: the residuals, on the same scale. " (figures::keys()) "."
             @if panels.iter().any(|p| p.against == Against::Fitted) {
-                " If a residual is that of a whole turn or of the magnitude of gravity, the abscissa is the change that the fitted effect "
+                " If a residual depends on several quantities, as that of a whole turn does, the abscissa is the change that the fitted effect "
                 "predicts beside the affine calibration: points on the diagonal are explained."
             }
         }

@@ -1,9 +1,9 @@
-//! The figures: residuals over time, effects against the quantities that they depend on, and remaining residuals against noise.
+//! The figures: residuals over time, and effects against the quantities that they depend on.
 
 use std::ops::Range;
 
 use maud::{Markup, html};
-use mimu::diagnose::picture::{Against, At, Panel, Picture, ResidualKind, Track};
+use mimu::diagnose::picture::{Against, At, Panel, ResidualKind, Track};
 use mimu::observable::Observable;
 use mimu::quantity::{Figure, Sensor};
 
@@ -179,29 +179,4 @@ pub(super) fn against(sensor: Sensor, panel: &Panel) -> Markup {
         &frames,
         &inside,
     )
-}
-
-/// Quantiles of the residuals, in sigmas of the known noise, against those of noise alone.
-pub(super) fn quantiles(picture: &Picture, after: bool) -> Markup {
-    let all = &picture.quantiles;
-    // Before an effect is removed, a row may be hundreds of sigmas off. Afterwards the line of noise has to be visible.
-    let y = |k: usize| range(all.iter().flat_map(|q| [q.found[k], q.band[0], q.band[1]]));
-    let ordinates: Vec<Range<f64>> = (0..if after { 2 } else { 1 }).map(y).collect();
-    let band: Vec<_> = all
-        .iter()
-        .map(|q| (q.normal, q.band[0], q.band[1]))
-        .collect();
-    let frames = frames(&range(all.iter().map(|q| q.normal)), &ordinates, 3.0 * GAP);
-    let inside = html! { @for (k, frame) in frames.iter().enumerate() {
-        (frame.axes(&match (k, after) { (0, false) => picture.sensor.name().into(), (0, true) => format!("{}: before", picture.sensor), _ => "after (another scale)".into() }, true))
-        (frame.band("band", &band))
-        (frame.line("fit", all.iter().map(|q| (q.normal, q.normal))))
-        (frame.dots("dot small", all.iter().map(|q| (q.normal, q.found[k]))))
-    } };
-    let names = [
-        "residuals against the normal distribution",
-        "normal quantile, σ",
-        "residual, σ",
-    ];
-    drawing(names, all.len(), &frames, &inside)
 }

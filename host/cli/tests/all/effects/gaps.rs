@@ -158,7 +158,6 @@ fn a_given_calibration_has_to_fit_the_recording() {
             more: Vec::new(),
             second: None,
             given: Some(given),
-            accept: Vec::new(),
         };
         diagnose(recordings, Options::IN_SAMPLE)
             .unwrap_err()

@@ -6,10 +6,10 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::hold_out::{chance_without_a_dwell, held_out_by_part, leverage, parts_helped};
 use super::second::second;
-use super::{LEVERAGE, SURVIVES, Second, coefficients_of, held_out, rms};
+use super::{LEVERAGE, SURVIVES, Second, held_out, rms};
 use crate::diagnose::rejected::{ErrorRms, Reason};
 use crate::diagnose::rows::Rows;
-use crate::diagnose::search::{Chosen, FALSE_LISTED, Search};
+use crate::diagnose::search::{Chosen, FALSE_LISTED, Search, without};
 use crate::diagnose::variance::{CommonWalk, Fitted, LikelihoodKind};
 use crate::effects::candidate::CandidateKind;
 use crate::effects::fitted::FittedEffect;
@@ -68,8 +68,7 @@ impl<'a> Acceptance<'a> {
     /// Columns of the kept effect `i` that the rows determine better than its prior does; all if there is no prior.
     fn determined(&self, kept: &[Chosen], i: usize, with: &Fitted) -> DMatrix<f64> {
         let one = &kept[i];
-        let before = kept[..i].iter().map(|c| c.columns.ncols());
-        let first = self.search.basis.ncols() + before.sum::<usize>();
+        let first = self.search.places(kept)[i].start;
         let by_rows = |k: &usize| {
             let variance = with.covariance[(first + k, first + k)];
             one.size.is_none_or(|size| variance < 0.5 * size * size)
@@ -79,8 +78,7 @@ impl<'a> Acceptance<'a> {
     }
 
     fn split_of(&self, kept: &[Chosen], i: usize, with: &Fitted) -> (f64, Split) {
-        let mut rest = kept.to_vec();
-        rest.remove(i);
+        let rest = without(kept, i);
         let columns = self.determined(kept, i, with);
         let [dwell, block] = leverage(self.rows, &self.search.model(&rest), &columns);
         let alone = block > LEVERAGE || self.held_rms(kept, with, self.usual).is_none();
@@ -137,15 +135,14 @@ impl<'a> Acceptance<'a> {
         with: &Fitted,
         passed: &[String],
     ) -> Option<Option<Failed>> {
-        let seconds = self.on_second_recording(kept, &coefficients_of(self.search, kept, with));
+        let seconds = self.on_second_recording(kept, &self.search.coefficients(kept, with));
         let (weights, split) = self.common(kept, with);
         let with_all = self.held(kept, with, split);
         let open = |at: &usize| !passed.contains(&kept[*at].candidate.id());
         for at in (0..kept.len()).rev().filter(open) {
-            let mut rest = kept.to_vec();
-            rest.remove(at);
-            let without = self.search.fit(&rest)?;
-            let both = [self.held(&rest, &without, split), with_all.clone()];
+            let rest = without(kept, at);
+            let null = self.search.fit(&rest)?;
+            let both = [self.held(&rest, &null, split), with_all.clone()];
             let too_few_dwells = weights[at] > LEVERAGE || both[1].is_none();
             let why = match weights[at] {
                 share if share > LEVERAGE => Some(Reason::OneDwell(share)),
@@ -261,20 +258,14 @@ impl<'a> Acceptance<'a> {
         (p > FALSE_LISTED).then_some(Reason::RandomWalk(p))
     }
 
-    /// Removes suggestions from `kept`: products without known physics that neither the second recording nor the user confirms.
-    pub fn suggestions(
-        &self,
-        kept: &mut Vec<Chosen>,
-        with: &Fitted,
-        accept: &[String],
-    ) -> Vec<Chosen> {
-        let seconds = self.on_second_recording(kept, &coefficients_of(self.search, kept, with));
+    /// Removes suggestions from `kept`: products without known physics that no second recording confirms.
+    pub fn suggestions(&self, kept: &mut Vec<Chosen>, with: &Fitted) -> Vec<Chosen> {
+        let seconds = self.on_second_recording(kept, &self.search.coefficients(kept, with));
         let confirmed = seconds.iter().map(|s| s.is_some_and(|s| s.shows));
-        let (taken, suggested): (Vec<_>, Vec<_>) =
-            kept.drain(..).zip(confirmed).partition(|(one, confirmed)| {
-                let listed = one.candidate.is_listed();
-                listed || *confirmed || accept.contains(&one.candidate.id())
-            });
+        let (taken, suggested): (Vec<_>, Vec<_>) = kept
+            .drain(..)
+            .zip(confirmed)
+            .partition(|(one, confirmed)| one.candidate.is_listed() || *confirmed);
         *kept = taken.into_iter().map(|t| t.0).collect();
         suggested.into_iter().map(|s| s.0).collect()
     }

@@ -1,13 +1,13 @@
 //! An accepted effect with what shows it.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 use serde::Serialize;
 
 use super::acceptance::Acceptance;
 use super::hold_out::{rms, rms_at_rest};
 use super::nonlinear::Nonlinear;
 use super::second::Second;
-use crate::diagnose::search::{Chosen, Search};
+use crate::diagnose::search::{Chosen, Search, without};
 use crate::diagnose::variance::Fitted;
 use crate::effects::fitted::FittedEffect;
 use crate::fit::Split;
@@ -59,21 +59,22 @@ pub(super) fn accepted(
     split: Split,
 ) -> Option<Vec<Accepted>> {
     let rows = search.rows;
-    let values = coefficients_of(search, kept, last);
+    let values = search.coefficients(kept, last);
     let seconds = judge.on_second_recording(kept, &values);
-    let (first, mut from) = (search.basis.ncols(), 0);
+    let places = search.places(kept);
+    let first = search.basis.ncols();
     let held_with_all = judge.held(kept, with, split);
     let mut accepted = Vec::new();
     for (i, one) in kept.iter().enumerate() {
-        let count = one.columns.ncols();
-        let mut rest = kept.to_vec();
-        rest.remove(i);
-        let without = search.fit(&rest)?;
-        let held_without = judge.held(&rest, &without, split);
+        let (from, count) = (places[i].start, places[i].len());
+        let rest = without(kept, i);
+        let held_without = judge.held(&rest, &search.fit(&rest)?, split);
         let both = [held_without.as_ref(), held_with_all.as_ref()];
         let held = both.map(|h| h.map(|h| rms(rows, h)));
         let at_rest = both.map(|h| h.and_then(|h| rms_at_rest(rows, h)));
-        let covariance = nonlinear.covariance.view((from, from), (count, count));
+        let shape = (count, count);
+        let of_effects = (from - first, from - first);
+        let covariance = nonlinear.covariance.view(of_effects, shape);
         let [before, after] = held.map(|h| h.unwrap_or(f64::NAN));
         let (at_rest_before, at_rest_after) = match at_rest {
             [Some(without), Some(with)] => (Some(without), Some(with)),
@@ -93,10 +94,7 @@ pub(super) fn accepted(
             held_out: split,
             second: seconds[i],
             covariance: covariance.into_owned(),
-            conditional: last
-                .covariance
-                .view((first + from, first + from), (count, count))
-                .into_owned(),
+            conditional: last.covariance.view((from, from), shape).into_owned(),
             held_out_rms_before: before,
             held_out_rms_after: after,
             held_out_at_rest_before: at_rest_before,
@@ -105,23 +103,6 @@ pub(super) fn accepted(
                 && !one.candidate.is_of_session()
                 && one.or_true_input().is_none(),
         });
-        from += count;
     }
     Some(accepted)
-}
-
-/// Coefficients of each of the chosen.
-pub(super) fn coefficients_of(
-    search: &Search,
-    chosen: &[Chosen],
-    fit: &Fitted,
-) -> Vec<DVector<f64>> {
-    let mut from = search.basis.ncols();
-    let mut all = Vec::new();
-    for one in chosen {
-        let count = one.columns.ncols();
-        all.push(fit.coefficients.rows(from, count).into_owned());
-        from += count;
-    }
-    all
 }

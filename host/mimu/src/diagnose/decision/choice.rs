@@ -24,15 +24,13 @@ pub(super) struct Choice {
     pub(super) not_excited: Vec<&'static Effect>,
 }
 
-/// Judges what the search has `found`, and searches again beside what stays. `without` are effects that are not tried, `accept` ids of terms that
-/// need no second recording.
+/// Judges what the search has `found`, and searches again beside what stays. `without` are effects that are not tried.
 pub(super) fn choose(
     search: &Search,
     judge: &Acceptance,
     found: Found,
     mut not_excited: Vec<&'static Effect>,
     without: &[Rejected],
-    accept: &[String],
 ) -> Option<Choice> {
     let is_jump = |one: &Chosen| matches!(one.candidate.kind, CandidateKind::Jump { .. });
     let (jumps, mut kept): (Vec<_>, Vec<_>) = found.chosen.into_iter().partition(is_jump);
@@ -74,7 +72,7 @@ pub(super) fn choose(
             with = search.fit(&kept)?;
         }
         passed = ids(&kept);
-        let set_aside = judge.suggestions(&mut kept, &with, accept);
+        let set_aside = judge.suggestions(&mut kept, &with);
         if set_aside.is_empty() && !failed_any {
             break;
         }

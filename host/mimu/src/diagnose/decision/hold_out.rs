@@ -3,10 +3,11 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::diagnose::columns::unit_columns;
-use crate::diagnose::rows::{RowFigure, Rows};
+use crate::diagnose::rows::Rows;
 use crate::diagnose::search::{Chosen, Search};
 use crate::diagnose::variance::Fitted;
 use crate::fit::Split;
+use crate::observable::Observable;
 
 /// Contiguous blocks that are left out in turn.
 const BLOCKS: usize = 4;
@@ -54,7 +55,7 @@ pub(in crate::diagnose) fn held_out(
         }
         let parts = search.variance.kept(&at.components, &kept)?;
         let white = parts.whiten(&model.select_rows(&kept));
-        let y = parts.whiten(&DMatrix::from_fn(kept.len(), 1, |i, _| rows.y[kept[i]]));
+        let y = parts.vector(&rows.y.select_rows(&kept));
         let (count, all) = (kept.len(), kept.len() + prior.len());
         let mut white = white.resize_vertically(all, 0.0);
         let y = y.resize_vertically(all, 0.0);
@@ -72,7 +73,7 @@ pub(in crate::diagnose) fn held_out(
         let (mut open, mut own) = (0.0, 0.0);
         // A turn belongs to the block in which it ends.
         for r in (0..rows.y.len()).filter(|r| parts_of(*r)[1] == block) {
-            out[r] = rows.y[r] - (model.row(r) * &solution)[(0, 0)];
+            out[r] = rows.y[r] - (model.row(r) * &solution)[0];
             if r < rows.judged.0 {
                 open += (model.row(r) * &by_parameters).norm_squared();
                 own += variances[r];
@@ -88,7 +89,7 @@ pub(in crate::diagnose) fn held_out(
 /// Root mean square of the rows at rest, SI, if the judged rows are turns; `None` if there are none.
 pub(super) fn rms_at_rest(rows: &Rows, residuals: &DVector<f64>) -> Option<f64> {
     let count = rows.y.len() - rows.judged.0;
-    (rows.figure == RowFigure::Direction && count > 0)
+    (rows.observable == Observable::Turns && count > 0)
         .then(|| (residuals.rows(rows.judged.0, count).norm_squared() / count as f64).sqrt())
 }
 
@@ -140,7 +141,7 @@ pub(super) fn chance_without_a_dwell(
     let left = |model: &DMatrix<f64>| {
         let found = variance.fit_at(model, at)?;
         let left = &rows.y - model * found.coefficients;
-        Some(whitener.whiten(&DMatrix::from_column_slice(left.len(), 1, left.as_slice())))
+        Some(whitener.vector(&left))
     };
     let (a, b) = (left(without)?, left(with)?);
     let witnesses = rows.witnesses();
@@ -164,7 +165,7 @@ pub(super) fn chance_without_a_dwell(
             return None;
         }
         let parts = variance.kept(at, &kept)?;
-        let y = parts.whiten(&DMatrix::from_fn(kept.len(), 1, |i, _| rows.y[kept[i]]));
+        let y = parts.vector(&rows.y.select_rows(&kept));
         let chi2 = |model: &DMatrix<f64>| {
             let q = parts
                 .whiten(&unit_columns(model).select_rows(&kept))

@@ -7,7 +7,7 @@ use nalgebra::DMatrix;
 
 use super::together::PLAUSIBLE;
 use crate::diagnose::columns::beside;
-use crate::diagnose::search::{Alternative, COEFFICIENT, CONFUSED, Chosen, Search};
+use crate::diagnose::search::{Alternative, COEFFICIENT, CONFUSED, Chosen, Search, without};
 use crate::diagnose::variance::Fitted;
 use crate::effects;
 use crate::effects::candidate::{Candidate, CandidateKind};
@@ -49,21 +49,11 @@ fn worse_with(
     rival: &'static Effect,
     with: &Fitted,
 ) -> Option<f64> {
-    let axes = kept[i].candidate.axes();
-    let mut candidate = Candidate::new(search.rows.sensor, CandidateKind::Effect(rival));
-    candidate.without_self_heating = kept[i].candidate.without_self_heating;
-    let of_axes = |k: &usize| {
-        rival.coefficients[*k]
-            .axis
-            .is_none_or(|a| axes.contains(&a))
-    };
-    candidate.active.retain(of_axes);
+    let candidate = kept[i].candidate.replaced_by(rival);
     if !candidate.is_slow_bias() || candidate.active.is_empty() {
         return None;
     }
-    let mut rest = kept.to_vec();
-    let one = rest.remove(i);
-    let bare = search.model(&rest);
+    let (one, bare) = (&kept[i], search.model(&without(kept, i)));
     let cost =
         |columns: usize, nonlinear: bool| COEFFICIENT * (columns + usize::from(nonlinear)) as f64;
     let fit = |model: &DMatrix<f64>| search.variance.fit_at(model, &with.components);

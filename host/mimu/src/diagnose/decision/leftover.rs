@@ -11,7 +11,7 @@ use crate::diagnose::search::{Chosen, Search};
 use crate::diagnose::variance::{Fitted, LikelihoodKind, VarianceModel};
 use crate::effects::candidate::Candidate;
 use crate::observable::{Observable, StratumName};
-use crate::quantity::{AXES, Figure, Sensor, significant};
+use crate::quantity::{AXES, Sensor, significant};
 use crate::triad::directions;
 
 /// A bias that wanders by more than this many times the noise of a dwell mean is unusual, and the verdict reports it even if the wander of
@@ -85,23 +85,15 @@ impl Serialize for Leftover {
 }
 
 impl Leftover {
-    /// Quantity of the residuals.
-    pub fn figure(&self) -> Figure {
-        match self.stratum.0 {
-            Observable::Turns | Observable::WholeTurns => Figure::Direction,
-            _ => Figure::Input,
-        }
-    }
-
     /// SI unit of the strength.
     pub fn unit(&self) -> &'static str {
-        self.figure().unit(self.sensor)
+        self.stratum.0.figure().unit(self.sensor)
     }
 
     /// A suggested term as residual structure; `change` is how it changes the fitted rows.
     pub(super) fn suggested(term: &Candidate, rows: &Rows, change: &DVector<f64>) -> Self {
         let axis = term.axes().first().copied();
-        let ours = rows.strata.iter().find(|s| s.axis == axis);
+        let ours = rows.strata.iter().find(|s| s.axis() == axis);
         let range = ours.map_or(0..rows.y.len(), |s| s.rows.clone());
         let mean_square = change.rows(range.start, range.len()).norm_squared() / range.len() as f64;
         Self {
@@ -129,10 +121,7 @@ pub(super) fn leftover(
         return left;
     };
     for (s, stratum) in rows.strata.iter().enumerate() {
-        let (extra_white, random_walk) = (
-            last.components.extra_white[s],
-            last.components.random_walk[s],
-        );
+        let [extra_white, random_walk] = last.components[s];
         let unit = stratum
             .random_walk
             .as_ref()
@@ -140,13 +129,13 @@ pub(super) fn leftover(
         let strength = (extra_white + random_walk * unit).sqrt();
         let jump = jumps
             .iter()
-            .find(|j| j.candidate.axes().first().copied() == stratum.axis);
+            .find(|j| j.candidate.axes().first().copied() == stratum.axis());
         // Without the components of this stratum: is the known noise enough? A random walk stays if the wander was not recorded, because
         // every bias wanders.
         let mut bare = last.components.clone();
-        bare.extra_white[s] = 0.0;
+        bare[s][0] = 0.0;
         if stratum.wander_known {
-            bare.random_walk[s] = 0.0;
+            bare[s][1] = 0.0;
         }
         let Some(bare) = variance.fit_at(model, &bare) else {
             continue;
@@ -167,7 +156,7 @@ pub(super) fn leftover(
         left.push(Leftover {
             sensor: rows.sensor,
             stratum: stratum.name,
-            axis: stratum.axis,
+            axis: stratum.axis(),
             against,
             strength,
             usual: !stratum.wander_known && !far && jump.is_none(),

@@ -10,7 +10,6 @@ use crate::diagnose::search::{Chosen, Search};
 use crate::diagnose::variance::Fitted;
 use crate::effects;
 use crate::effects::candidate::{Candidate, CandidateKind};
-use crate::effects::effect::Scope;
 
 /// Confidence at which the limit has to be excluded: that of the intervals.
 const CONFIDENCE: f64 = 0.95;
@@ -54,19 +53,15 @@ fn limit_of(search: &Search, kept: &[Chosen], i: usize) -> Option<Chosen> {
         return None;
     }
     let all = search.candidate_of(limit)?;
+    let on_axes = kept[i].candidate.replaced_by(limit).active;
     let mut candidate = Candidate {
         without_self_heating: kept[i].candidate.without_self_heating,
         choices: kept[i].candidate.choices,
         ..all.clone()
     };
-    let axes = kept[i].candidate.axes();
-    let of_axes = |k: &usize| {
-        let coefficient = &limit.coefficients[*k];
-        let on_axis = coefficient.axis.is_none_or(|a| axes.contains(&a));
-        // A curvature is not part of the limit.
-        on_axis && coefficient.scope != Scope::Recording && all.rests_on(*k).is_none()
-    };
-    candidate.active.retain(of_axes);
+    // A curvature is not part of the limit.
+    let is_part = |k: &usize| on_axes.contains(k) && all.rests_on(*k).is_none();
+    candidate.active.retain(is_part);
     let columns = candidate.columns(search.rows, 0.0);
     (!candidate.active.is_empty()).then(|| Chosen {
         columns,

@@ -4,7 +4,7 @@
 //! The search finds a parameter in steps of 4 %, which is enough to compare candidates. A good recording determines a lag to 1 %, so that
 //! an interval about the last step would miss the truth. Hence Gauss-Newton steps from there.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
 use super::model::Model;
 use crate::diagnose::columns::beside;
@@ -43,15 +43,11 @@ fn with_parameter(kept: &[Chosen]) -> Vec<usize> {
 /// Derivatives of the rows by the logarithms of the parameters of `which` of the kept, at the coefficients of `fitted`.
 fn slopes(search: &Search, kept: &[Chosen], which: &[usize], fitted: &Fitted) -> DMatrix<f64> {
     let mut out = DMatrix::zeros(search.rows.y.len(), which.len());
-    let mut from = search.basis.ncols();
-    for (k, one) in kept.iter().enumerate() {
-        let count = one.columns.ncols();
-        if let Some(column) = which.iter().position(|w| *w == k) {
-            let values: DVector<f64> = fitted.coefficients.rows(from, count).into_owned();
-            let slope = one.candidate.slope(search.rows, one.parameter, &values);
-            out.set_column(column, &slope);
-        }
-        from += count;
+    let all = search.coefficients(kept, fitted);
+    for (column, k) in which.iter().enumerate() {
+        let one = &kept[*k];
+        let slope = one.candidate.slope(search.rows, one.parameter, &all[*k]);
+        out.set_column(column, &slope);
     }
     out
 }

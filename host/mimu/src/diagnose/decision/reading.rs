@@ -12,7 +12,7 @@ use super::hold_out::{held_out, rms};
 use super::leftover::{CorrelatesWith, FALSE_LEFTOVER, Leftover};
 use crate::diagnose::columns::{beside, independent_of, unit_columns};
 use crate::diagnose::rows::Rows;
-use crate::diagnose::search::{COEFFICIENT, Chosen, Search};
+use crate::diagnose::search::{COEFFICIENT, Chosen, Search, without};
 use crate::diagnose::variance::{Fitted, LikelihoodKind};
 use crate::effects::quantity::Conditions;
 use crate::fit::Split;
@@ -155,7 +155,7 @@ fn of_axis(
     {
         return None;
     }
-    let of_axis = rows.strata.iter().find(|s| s.axis == Some(axis));
+    let of_axis = rows.strata.iter().find(|s| s.axis() == Some(axis));
     let stratum = of_axis.or(rows.strata.first())?;
     let squares = |m: &DMatrix<f64>, f: &Fitted| {
         let left = &rows.y - m * &f.coefficients;
@@ -182,13 +182,8 @@ fn of_axis(
 /// a smooth nonlinearity.
 pub(super) fn worse_with_steps(search: &Search, chosen: &[Chosen], one: usize) -> Option<f64> {
     const PLACES: usize = PIECES[2];
-    let (group, rest): (Vec<_>, Vec<_>) = chosen
-        .iter()
-        .cloned()
-        .enumerate()
-        .partition(|(k, _)| *k == one);
-    let rest: Vec<Chosen> = rest.into_iter().map(|c| c.1).collect();
-    let columns: usize = group.iter().map(|c| c.1.columns.ncols()).sum();
+    let rest = without(chosen, one);
+    let columns = chosen[one].columns.ncols();
     let (null, now) = (search.fit(&rest)?, search.fit(chosen)?);
     let model = search.model(&rest);
     let readings = Readings::new(search.by_dwell(), search.freed(&model, &null));
@@ -198,12 +193,11 @@ pub(super) fn worse_with_steps(search: &Search, chosen: &[Chosen], one: usize) -
         .collect();
     let steps = all.into_iter().reduce(|a, b| beside(&a, &b))?;
     let whitener = search.variance.whitener(&null.components)?;
-    let y = DMatrix::from_column_slice(search.rows.y.len(), 1, search.rows.y.as_slice());
     let q = whitener.whiten(&model).qr().q();
-    let across = |m: DMatrix<f64>| &m - &q * q.tr_mul(&m);
-    let (mut left, white) = (across(whitener.whiten(&y)), whitener.whiten(&steps));
+    let (y, white) = (whitener.vector(&search.rows.y), whitener.whiten(&steps));
     let sizes: Vec<f64> = white.column_iter().map(|c| c.norm()).collect();
-    let mut white = across(white);
+    let mut left = &y - &q * q.tr_mul(&y);
+    let mut white = &white - &q * q.tr_mul(&white);
     // The place of a step is searched too, like the nonlinear parameter of an effect, but among so many places.
     let price = COEFFICIENT + 2.0 * (PLACES as f64).ln();
     let mut taken: Vec<usize> = Vec::new();
@@ -211,14 +205,14 @@ pub(super) fn worse_with_steps(search: &Search, chosen: &[Chosen], one: usize) -
         let explained = |k: usize| {
             let column = white.column(k);
             let own = column.norm() > 1e-3 * sizes[k];
-            own.then(|| column.dot(&left.column(0)).powi(2) / column.norm_squared())
+            own.then(|| column.dot(&left).powi(2) / column.norm_squared())
         };
         let each = (0..white.ncols()).filter_map(|k| Some((k, explained(k)?)));
         let Some((best, _)) = each.max_by(|a, b| a.1.total_cmp(&b.1)) else {
             break;
         };
         let unit = white.column(best).normalize();
-        left -= &unit * (unit.tr_mul(&left));
+        left -= &unit * unit.dot(&left);
         white -= &unit * (unit.tr_mul(&white));
         taken.push(best);
     }

@@ -61,11 +61,9 @@ pub(super) fn second(rows: &Rows, effects: &[FittedEffect]) -> Option<Vec<Second
         .collect();
     // Residuals of a fit of the affine parameters alone, and the length of the decorrelated ones.
     let left = |y: &DVector<f64>| {
-        let y = DMatrix::from_column_slice(y.len(), 1, y.as_slice());
-        let decorrelated = whitener.whiten(&y);
-        let by = white.solve(&decorrelated, 1e-12).ok()?;
-        let plain = (&y - &search.basis * &by).column(0).into_owned();
-        let by_noise = decorrelated - whitener.whiten(&(&search.basis * by));
+        let by = white.solve(&whitener.vector(y), 1e-12).ok()?;
+        let plain = y - &search.basis * by;
+        let by_noise = whitener.vector(&plain);
         Some((plain, by_noise.norm()))
     };
     let mut all = Vec::new();

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::reading::worse_with_steps;
-use crate::diagnose::search::{Chosen, Search};
+use crate::diagnose::search::{Chosen, Search, without};
 use crate::effects::alternatives::alternatives;
 use crate::quantity::Sensor;
 
@@ -30,8 +30,7 @@ pub(super) fn undecided(search: &Search, kept: &[Chosen]) -> Vec<Undecided> {
     let sensor = search.rows.sensor;
     let mut all = Vec::new();
     for (i, one) in kept.iter().enumerate() {
-        let mut rest = kept.to_vec();
-        rest.remove(i);
+        let rest = without(kept, i);
         let id = one.candidate.id();
         for rival in alternatives(&id) {
             let worse = search.worse_with(&rival.law, one, &rest);

@@ -1,32 +1,41 @@
 //! Plots of an effect against the quantity that it depends on.
 //!
 //! Component plus residual instead of an added-variable plot, which shows two residuals against each other, not against a rate or a
-//! temperature. As in the added-variable plot, the part of the component that the affine calibration absorbs is subtracted: its mean,
-//! and its best straight line if the calibration is linear in the variable. Otherwise a cubic would be drawn with a scale factor that
-//! the recording does not show.
+//! temperature. As in the added-variable plot, the part of the component that the affine calibration absorbs is subtracted. Otherwise a cubic would be drawn
+//! with a scale factor that the recording does not show.
 
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
-use super::abscissa::{Dependence, abscissa, dependence};
-use super::{Abscissa, ResidualKind, Track};
+use super::{ResidualKind, Track};
 use crate::diagnose::decision::Accepted;
 use crate::diagnose::rows::Rows;
 use crate::diagnose::search::Search;
 use crate::diagnose::variance::Fitted;
-use crate::quantity::AXES;
+use crate::effects::candidate::Candidate;
+use crate::effects::quantity::{Conditions, Quantity, REFERENCE_C};
+use crate::quantity::{AXES, Sensor};
 use crate::signal::blocks::extent;
 
-/// Points of a curve.
-const POINTS: usize = 81;
+/// Abscissa of a drawing.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Abscissa {
+    /// Name.
+    pub name: String,
+    /// Unit for display.
+    pub unit: String,
+    /// From SI to this unit: `factor * x + offset`.
+    pub factor: f64,
+    /// See `factor`.
+    pub offset: f64,
+}
 
 /// Abscissa of a panel.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub enum Against {
-    /// What the effect depends on.
+    /// The one quantity that the effect depends on.
     Variable(Abscissa),
-    /// The effect's contribution to the row beside the affine calibration. A row that is a whole turn, or the magnitude of gravity, is
-    /// not a function of one quantity.
+    /// The effect's contribution to the row beside the affine calibration: a product, a whole turn and the magnitude of gravity are functions of several.
     Fitted,
 }
 
@@ -58,7 +67,7 @@ pub struct Curve {
     pub half: f64,
 }
 
-/// The part of an effect on one axis that depends on one quantity.
+/// The part of an effect on one axis that depends on one quantity, or all of it in rows that several axes move.
 #[derive(Debug, Clone, Serialize)]
 pub struct Panel {
     /// Axis, and coefficients.
@@ -69,53 +78,38 @@ pub struct Panel {
     pub against: Against,
     /// Rows.
     pub points: Vec<At>,
-    /// Ascending in x.
+    /// At the rows, ascending in x.
     pub curve: Vec<Curve>,
 }
 
-/// Coefficients of one panel.
-struct Group {
-    axis: usize,
-    on: Dependence,
-    /// Indices of the regressors, and of the coefficients: a coefficient of all axes has three regressors.
-    slots: Vec<usize>,
-    members: Vec<usize>,
+/// The quantity that each regressor is a function of; `None` if it is one of several, or of none that can be drawn.
+fn quantities(candidate: &Candidate) -> Vec<Option<Quantity>> {
+    let each = candidate.slot_regressors().into_iter();
+    let alone = each.map(|regressor| match regressor.quantities()[..] {
+        // The first is infinite in all recordings but the first, and the others are made of several.
+        [Quantity::RecordingTime | Quantity::Up | Quantity::RateMagnitude] => None,
+        [alone] => Some(alone),
+        _ => None,
+    });
+    alone.collect()
 }
 
-/// Groups the coefficients of one axis that depend on the same quantity, such as the linear and quadratic parts of a thermal bias.
-fn groups(one: &Accepted) -> Vec<Group> {
-    let candidate = &one.chosen.candidate;
-    let mut groups: Vec<Group> = Vec::new();
-    for (slot, (member, axis)) in candidate.slots().into_iter().enumerate() {
-        let on = dependence(candidate, slot);
-        let alone = matches!(on, Dependence::Alone(_));
-        match groups
-            .iter_mut()
-            .find(|g| alone && g.axis == axis && g.on == on)
-        {
-            Some(group) => {
-                group.slots.push(slot);
-                group.members.push(member);
-            }
-            None => groups.push(Group {
-                axis,
-                on,
-                slots: vec![slot],
-                members: vec![member],
-            }),
+/// The coefficients of `candidate` that are drawn on a track, by the quantity that they depend on: the linear and the quadratic part of a thermal bias
+/// together.
+fn groups(candidate: &Candidate, axis: Option<usize>) -> Vec<(Option<Quantity>, Vec<usize>)> {
+    let slots = candidate.slots();
+    if axis.is_none() {
+        return vec![(None, (0..candidate.active.len()).collect())];
+    }
+    let mut groups: Vec<(Option<Quantity>, Vec<usize>)> = Vec::new();
+    let all = slots.into_iter().zip(quantities(candidate));
+    for ((member, _), on) in all.filter(|((_, of), _)| Some(*of) == axis) {
+        match groups.iter_mut().find(|group| group.0 == on) {
+            Some(group) => group.1.push(member),
+            None => groups.push((on, vec![member])),
         }
     }
     groups
-}
-
-/// Straight line by least squares, or the mean alone.
-fn line(x: &[f64], y: &[f64], sloped: bool) -> (f64, f64) {
-    let n = x.len() as f64;
-    let (mx, my) = (x.iter().sum::<f64>() / n, y.iter().sum::<f64>() / n);
-    let sxx: f64 = x.iter().map(|x| (x - mx).powi(2)).sum();
-    let sxy: f64 = x.iter().zip(y).map(|(x, y)| (x - mx) * (y - my)).sum();
-    let slope = if sloped && sxx > 0.0 { sxy / sxx } else { 0.0 };
-    (my - slope * mx, slope)
 }
 
 /// Panels of an accepted effect. `None` where its columns are singular.
@@ -126,16 +120,6 @@ pub(super) fn panels(
     one: &Accepted,
     tracks: &[Track],
 ) -> Option<Vec<Panel>> {
-    let mut panels = Vec::new();
-    for group in groups(one) {
-        let of_axis = tracks
-            .iter()
-            .filter(|t| t.kind == ResidualKind::Input && t.axis == Some(group.axis));
-        for track in of_axis {
-            panels.extend(variable(rows, search, one, &group, track));
-        }
-    }
-    // Whole rows, beside the affine parameters.
     let white = search.variance.whitener(&last.components)?;
     let (basis, columns) = (&search.basis, &one.chosen.columns);
     let share = white
@@ -143,184 +127,144 @@ pub(super) fn panels(
         .svd(true, true)
         .solve(&white.whiten(columns), 1e-12)
         .ok()?;
-    let across = columns - basis * share;
-    for track in tracks.iter().filter(|t| t.axis.is_none()) {
-        // Rows of another axis are not drawn.
-        let mut ours = track.rows.iter();
-        if ours.any(|r| columns.row(*r).amax() > 0.0) {
-            panels.push(whole(one, &across, track));
-        }
-    }
-    Some(panels)
-}
-
-fn whole(one: &Accepted, across: &DMatrix<f64>, track: &Track) -> Panel {
-    let fitted = across * DVector::from_column_slice(&one.effect.values);
-    let mut curve: Vec<Curve> = track
-        .rows
-        .iter()
-        .map(|r| {
-            let by = across.row(*r).transpose();
-            Curve {
-                x: fitted[*r],
-                value: fitted[*r],
-                half: 2.0 * by.dot(&(&one.conditional * &by)).max(0.0).sqrt(),
-            }
-        })
-        .collect();
-    curve.sort_by(|a, b| a.x.total_cmp(&b.x));
-    Panel {
-        title: track.name.clone(),
-        kind: track.kind,
-        against: Against::Fitted,
-        points: points(track, |i| {
-            let effect = fitted[track.rows[i]];
-            (effect, effect)
-        }),
-        curve,
-    }
-}
-
-/// `at` gives abscissa and effect of each row of the track.
-fn points(track: &Track, at: impl Fn(usize) -> (f64, f64)) -> Vec<At> {
-    let of = |(i, s): (usize, &super::Sample)| {
-        let (x, effect) = at(i);
-        let partial = s.residual[1] + effect;
-        At {
-            x,
-            sigma: s.sigma,
-            partial,
-            predicted: partial - s.held_out[1],
-            after: s.residual[1],
-            held_out: s.held_out[1],
-        }
-    };
-    track.samples.iter().enumerate().map(of).collect()
-}
-
-/// `None` if the variable is constant in the recording.
-fn variable(
-    rows: &Rows,
-    search: &Search,
-    one: &Accepted,
-    group: &Group,
-    track: &Track,
-) -> Option<Panel> {
-    let (candidate, parameter) = (&one.chosen.candidate, one.chosen.parameter);
-    let conditions = rows.conditions(candidate.followed(parameter));
-    let column = |k: usize, r: usize| one.chosen.columns[(r, k)];
-    let x: Vec<f64> = track
-        .rows
-        .iter()
-        .map(|r| match &group.on {
-            Dependence::Alone(field) => rows.mean(*r, &conditions, |at| field.of(at, group.axis)),
-            _ => column(group.members[0], *r),
-        })
-        .collect();
-    let [low, high] = extent(x.iter().copied());
-    if !(high - low > 1e-9 * high.abs().max(low.abs())) {
-        return None;
-    }
-    let like = *conditions.first()?;
-    let values = |x: f64| match &group.on {
-        Dependence::Alone(field) => {
-            let mut all = vec![0.0; candidate.axes().len()];
-            candidate.regressors(&field.with(like, group.axis, x), parameter, &mut all);
-            group.slots.iter().map(|k| all[*k]).collect()
-        }
-        _ => vec![x],
-    };
-    let names: Vec<String> = candidate.names().into_iter().map(|n| n.0).collect();
-    let members: Vec<&str> = group.members.iter().map(|k| names[*k].as_str()).collect();
-    let axis = AXES[group.axis];
+    let candidate = &one.chosen.candidate;
     let drawn = Drawn {
+        rows,
         one,
-        track,
-        members: &group.members,
-        sloped: affine_in(search, &x, track),
-        x,
+        across: columns - basis * share,
+        conditions: &rows.conditions(candidate.followed(one.chosen.parameter)),
     };
-    let title = match members[..] {
-        [name] if name != axis => format!("{} {axis}, {name}", candidate.sensor),
-        _ => format!("{} {axis}", candidate.sensor),
-    };
-    Some(drawn.panel(
-        title,
-        abscissa(&group.on, candidate, group.members[0], group.axis),
-        values,
-    ))
+    let each = tracks.iter().flat_map(|track| {
+        let groups = groups(candidate, track.axis).into_iter();
+        groups.filter_map(|(on, members)| drawn.panel(track, on, &members))
+    });
+    Some(each.collect())
 }
 
-/// Coefficients of an effect that are functions of one abscissa, on one track.
+/// An effect to be drawn.
 struct Drawn<'a> {
+    rows: &'a Rows,
     one: &'a Accepted,
-    track: &'a Track,
-    /// Indices of the coefficients.
-    members: &'a [usize],
-    /// Abscissa of each row of the track.
-    x: Vec<f64>,
-    /// Whether the affine calibration can absorb a straight line in x.
-    sloped: bool,
+    /// Its columns without what the affine calibration absorbs.
+    across: DMatrix<f64>,
+    conditions: &'a [Conditions],
 }
 
 impl Drawn<'_> {
-    /// `values` gives the regressors of the members at an abscissa.
-    fn panel(&self, title: String, abscissa: Abscissa, values: impl Fn(f64) -> Vec<f64>) -> Panel {
-        let column = |k: usize, r: usize| self.one.chosen.columns[(r, k)];
-        let lines: Vec<(f64, f64)> = self
-            .members
+    /// The coefficients `members` on a track; `None` if they do not move it, or if the quantity `on` that they depend on is constant in the recording.
+    fn panel(&self, track: &Track, on: Option<Quantity>, members: &[usize]) -> Option<Panel> {
+        let columns = &self.one.chosen.columns;
+        let mut moves = track
+            .rows
             .iter()
-            .map(|k| {
-                let y: Vec<f64> = self.track.rows.iter().map(|r| column(*k, *r)).collect();
-                line(&self.x, &y, self.sloped)
-            })
-            .collect();
-        let less = |m: usize, x: f64, value: f64| value - lines[m].0 - lines[m].1 * x;
-        let value = |k: &usize| self.one.effect.values[*k];
-        let count = self.members.len();
-        let covariance = DMatrix::from_fn(count, count, |i, j| {
-            self.one.conditional[(self.members[i], self.members[j])]
-        });
-        let [low, high] = extent(self.x.iter().copied());
-        let curve = (0..POINTS).map(|i| {
-            let x = low + (high - low) * i as f64 / (POINTS - 1) as f64;
-            let values = values(x);
-            let at = DVector::from_fn(count, |m, _| less(m, x, values[m]));
-            Curve {
-                x,
-                value: self
-                    .members
-                    .iter()
-                    .zip(&at)
-                    .map(|(k, v)| value(k) * v)
-                    .sum(),
-                half: 2.0 * at.dot(&(&covariance * &at)).max(0.0).sqrt(),
-            }
-        });
-        let effect = |i: usize| {
-            let members = self.members.iter().enumerate();
-            members
-                .map(|(m, k)| value(k) * less(m, self.x[i], column(*k, self.track.rows[i])))
-                .sum()
-        };
-        Panel {
-            title,
-            kind: self.track.kind,
-            against: Against::Variable(abscissa),
-            curve: curve.collect(),
-            points: points(self.track, |i| (self.x[i], effect(i))),
+            .flat_map(|r| members.iter().map(|k| columns[(*r, *k)]));
+        if !moves.any(|v| v != 0.0) {
+            return None;
         }
+        let count = members.len();
+        let of = |k: usize| self.one.effect.values[members[k]];
+        let values = DVector::from_fn(count, |k, _| of(k));
+        let covariance = self
+            .one
+            .conditional
+            .select_rows(members)
+            .select_columns(members);
+        let axis = track.axis.unwrap_or_default();
+        let (mut points, mut curve) = (Vec::new(), Vec::new());
+        for (r, sample) in track.rows.iter().zip(&track.samples) {
+            let by = DVector::from_fn(count, |k, _| self.across[(*r, members[k])]);
+            let value = by.dot(&values);
+            let x = on.map_or(value, |on| {
+                self.rows.mean(*r, self.conditions, |at| on.of(at, axis))
+            });
+            let partial = sample.residual[1] + value;
+            points.push(At {
+                x,
+                sigma: sample.sigma,
+                partial,
+                predicted: partial - sample.held_out[1],
+                after: sample.residual[1],
+                held_out: sample.held_out[1],
+            });
+            curve.push(Curve {
+                x,
+                value,
+                half: 2.0 * by.dot(&(&covariance * &by)).max(0.0).sqrt(),
+            });
+        }
+        curve.sort_by(|a, b| a.x.total_cmp(&b.x));
+        let [low, high] = extent(points.iter().map(|at| at.x));
+        let constant = !(high - low > 1e-9 * high.abs().max(low.abs()));
+        let candidate = &self.one.chosen.candidate;
+        (on.is_none() || !constant).then(|| Panel {
+            title: title(candidate, track, members),
+            kind: track.kind,
+            against: on.map_or(Against::Fitted, |on| {
+                Against::Variable(abscissa(on, candidate.sensor, axis))
+            }),
+            points,
+            curve,
+        })
     }
 }
 
-/// Whether the affine calibration can absorb a straight line in `x`, the values of the rows of `track`.
-fn affine_in(search: &Search, x: &[f64], track: &Track) -> bool {
-    let mean = x.iter().sum::<f64>() / x.len() as f64;
-    let mut column = DVector::zeros(search.rows.y.len());
-    for (r, x) in track.rows.iter().zip(x) {
-        column[*r] = x - mean;
+/// Axis and coefficient, or what the rows of a track are.
+fn title(candidate: &Candidate, track: &Track, members: &[usize]) -> String {
+    let Some(axis) = track.axis.map(|axis| AXES[axis]) else {
+        return track.name.clone();
+    };
+    let name = &candidate.names()[members[0]].0;
+    match members.len() == 1 && name != axis {
+        true => format!("{} {axis}, {name}", candidate.sensor),
+        false => format!("{} {axis}", candidate.sensor),
     }
-    let left = &column - &search.basis * search.basis.tr_mul(&column);
-    // Within 1 %: the input is known for each dwell only, and the reading is along the sensor's own direction.
-    left.norm() < 0.01 * column.norm()
+}
+
+/// The abscissa of a quantity in the error of `axis`.
+fn abscissa(of: Quantity, sensor: Sensor, axis: usize) -> Abscissa {
+    let (factor, unit) = match of {
+        Quantity::Temperature => (1.0, "°C"),
+        of => of.readable(sensor),
+    };
+    Abscissa {
+        name: of.in_words(sensor, axis),
+        unit: unit.into(),
+        factor,
+        offset: match of {
+            Quantity::Temperature => REFERENCE_C,
+            _ => 0.0,
+        },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects;
+    use crate::effects::candidate::CandidateKind;
+
+    #[test]
+    fn regressors_tell_what_they_are_functions_of() {
+        let cases = [
+            ("gyro_g_sensitivity", 5, Some(("force z", "g"))),
+            (
+                "gyro_scale_asymmetry",
+                1,
+                Some(("rate along gyro y", "deg/s")),
+            ),
+            ("accel_scale_cubic", 2, Some(("force along accel z", "g"))),
+            ("gyro_warm_up", 0, Some(("time", "min"))),
+            ("accel_thermal_bias", 4, Some(("temperature", "°C"))),
+            ("gyro_thermal_scale", 0, None),
+            ("accel_size_effect", 0, None),
+        ];
+        for (id, k, drawn) in cases {
+            let effect = effects::by_id(id).unwrap();
+            let candidate = Candidate::new(effect.sensor, CandidateKind::Effect(effect));
+            let axis = effect.coefficients[k].axis.unwrap();
+            let found = quantities(&candidate)[k].map(|of| abscissa(of, effect.sensor, axis));
+            let found = found.as_ref().map(|a| (a.name.as_str(), a.unit.as_str()));
+            assert_eq!(found, drawn, "{id}");
+        }
+    }
 }

@@ -7,37 +7,28 @@ use super::{Row, Rows};
 use crate::diagnose::columns::unit_columns;
 use crate::effects::quantity::Conditions;
 use crate::effects::temperature::without_self_heating;
+use crate::observation::from_centre;
 use crate::quantity::Sensor;
 use mimu_recording::Reference;
 
-/// For each part the places of its nuisance columns among those of all, and how many there are. Recordings with the same
-/// reference share the columns of the matrix; each has separate columns for its biases.
+/// First of the derivatives by o.
+const OF_BIAS: usize = 9;
+
+/// For each part the places of its derivatives by the free elements of C, by o, and by what it has alone, among those of all; and how many there are.
+/// Recordings with the same reference share those by C.
 fn places(parts: &[(usize, Part)]) -> (Vec<Vec<usize>>, usize) {
-    let mut shared: Vec<(Reference, Vec<usize>)> = Vec::new();
-    let mut count = 0;
-    let mut new = |many: usize| {
-        count += many;
-        (count - many..count).collect::<Vec<usize>>()
-    };
-    let mut all = Vec::new();
+    let mut shared: Vec<(Reference, usize)> = Vec::new();
+    let (mut all, mut count) = (Vec::new(), 0);
     for (_, part) in parts {
-        let matrix = part.nuisance.ncols() - part.biases.len();
-        let known = shared.iter().find(|s| s.0 == part.reference);
-        let of_matrix = match known {
-            Some((_, places)) => places.clone(),
-            None => {
-                let places = new(matrix);
-                shared.push((part.reference, places.clone()));
-                places
-            }
-        };
-        let of_biases = new(part.biases.len());
-        let (mut matrix, mut biases) = (of_matrix.into_iter(), of_biases.into_iter());
-        let place = |k: usize| match part.biases.contains(&k) {
-            true => biases.next(),
-            false => matrix.next(),
-        };
-        all.push((0..part.nuisance.ncols()).filter_map(place).collect());
+        let (matrix, own) = (part.free.len(), 3 + part.lines[0].own.len());
+        let known = shared.iter().find(|s| s.0 == part.reference());
+        let first = known.map_or(count, |s| s.1);
+        if first == count {
+            shared.push((part.reference(), first));
+            count += matrix;
+        }
+        all.push((first..first + matrix).chain(count..count + own).collect());
+        count += own;
     }
     (all, count)
 }
@@ -55,122 +46,63 @@ fn order(parts: &[(usize, Part)], judged: &[usize]) -> Vec<(usize, usize)> {
     order
 }
 
-/// Conditions, dwells and temperatures of all recordings, one after another, as in [`Rows`].
-struct Joined {
-    conditions: Vec<Conditions>,
-    block: Vec<(usize, usize)>,
-    temperature: Vec<Vec<(f64, f64)>>,
-    first: Vec<usize>,
-    /// Index of the first condition of each part.
-    first_condition: Vec<usize>,
-}
-
-impl Joined {
-    fn of(parts: &[(usize, Part)], sessions: usize) -> Self {
-        let mut all = Self {
-            conditions: Vec::new(),
-            block: Vec::new(),
-            temperature: vec![Vec::new(); sessions],
-            first: vec![0],
-            first_condition: Vec::new(),
-        };
-        for session in 0..sessions {
-            let dwells = match parts.iter().find(|p| p.0 == session) {
-                Some((_, part)) => {
-                    all.add(session, part);
-                    let last = part.rows.iter().flat_map(|r| r.dwells).max();
-                    1 + last.unwrap_or(0)
-                }
-                None => 0,
-            };
-            all.first.push(all.first[session] + dwells);
-        }
-        all
-    }
-
-    fn add(&mut self, session: usize, part: &Part) {
-        self.first_condition.push(self.conditions.len());
-        let conditions = part.conditions.iter();
-        self.conditions
-            .extend(conditions.map(|m| Conditions { session, ..*m }));
-        self.block.extend(part.block.iter().map(|b| (session, *b)));
-        self.temperature[session].clone_from(&part.temperature_offset);
-    }
-
-    /// A row of part `p`, which is of recording `session`.
-    fn row(&self, row: &Row, p: usize, session: usize) -> Row {
-        let offset = self.first_condition[p];
-        Row {
-            conditions: row.conditions.start + offset..row.conditions.end + offset,
-            weights: row.weights.clone(),
-            dwells: row.dwells.map(|d| d + self.first[session]),
-            moving: row.moving,
-        }
-    }
-}
-
-/// Residuals and derivatives of all rows.
-struct Linear {
-    y: DVector<f64>,
-    nuisance: DMatrix<f64>,
-    by_matrix: DMatrix<f64>,
-}
-
-impl Linear {
-    fn zeros(rows: usize, columns: usize) -> Self {
-        Self {
-            y: DVector::zeros(rows),
-            nuisance: DMatrix::zeros(rows, columns),
-            by_matrix: DMatrix::zeros(rows, 9),
-        }
-    }
-
-    /// Sets row `to` to row `from` of `part`, whose nuisance columns have these `places`.
-    fn set(&mut self, to: usize, part: &Part, from: usize, places: &[usize]) {
-        self.y[to] = part.y[from];
-        for (k, place) in places.iter().enumerate() {
-            self.nuisance[(to, *place)] = part.nuisance[(from, k)];
-        }
-        self.by_matrix.set_row(to, &part.by_matrix.row(from));
-    }
-
-    /// The parameters of the part whose nuisance columns have these `places`, for columns of length 1.
-    fn parameters_of_unit_columns(&self, part: &Part, places: &[usize]) -> DMatrix<f64> {
-        let mut parameters = part.parameters.clone();
-        for (column, place) in part.parameters.column_iter().zip(places) {
-            let size = self.nuisance.column(*place).norm();
-            let size = if size > 0.0 { size } else { 1.0 };
-            parameters.set_column(*place, &(column / size));
-        }
-        parameters
-    }
-}
-
 /// One problem of `parts`, each with the index of its recording, out of `sessions` recordings. `None` if the first recording
 /// is missing.
-pub(super) fn join(sensor: Sensor, parts: Vec<(usize, Part)>, sessions: usize) -> Option<Rows> {
+pub(super) fn join(sensor: Sensor, parts: &[(usize, Part)], sessions: usize) -> Option<Rows> {
     let (0, head) = parts.first()? else {
         return None;
     };
-    let (figure, together) = (head.figure, head.judged.1);
-    let judged_rows = |(_, part): &(usize, Part)| match part.figure == figure {
-        true => part.judged.0,
+    let observable = head.strata.first()?.name.0;
+    let judged_rows = |(_, part): &(usize, Part)| match part.strata[0].name.0 == observable {
+        true => part.judged(),
         false => 0,
     };
     let judged: Vec<usize> = parts.iter().map(judged_rows).collect();
-    let joined = Joined::of(&parts, sessions);
-    let (places, columns) = places(&parts);
-    let total: usize = parts.iter().map(|p| p.1.y.len()).sum();
-    let mut linear = Linear::zeros(total, columns);
+    let (places, columns) = places(parts);
+    let total: usize = parts.iter().map(|p| p.1.lines.len()).sum();
+    let mut temperature = vec![Vec::new(); sessions];
+    let (mut conditions, mut block, mut first_condition) = (Vec::new(), Vec::new(), Vec::new());
+    let mut dwells = vec![0; sessions];
+    for (session, part) in parts {
+        let session = *session;
+        first_condition.push(conditions.len());
+        let own = part.conditions.iter();
+        conditions.extend(own.map(|m| Conditions { session, ..*m }));
+        block.extend(part.block.iter().map(|b| (session, *b)));
+        temperature[session].clone_from(&part.temperature_offset);
+        let last = part.lines.iter().flat_map(|line| line.row.dwells).max();
+        dwells[session] = 1 + last.unwrap_or(0);
+    }
+    let mut first = vec![0];
+    first.extend(dwells.iter().scan(0, |end, count| {
+        *end += count;
+        Some(*end)
+    }));
+    let mut y = DVector::zeros(total);
+    let mut nuisance = DMatrix::zeros(total, columns);
+    let mut by_matrix = DMatrix::zeros(total, OF_BIAS);
     let mut strata = Vec::new();
     let mut rows = Vec::with_capacity(total);
-    for (p, s) in order(&parts, &judged) {
+    for (p, s) in order(parts, &judged) {
         let (session, part) = &parts[p];
         let from = rows.len();
         let mut stratum = part.strata[s].clone();
-        for r in stratum.rows.clone() {
-            linear.set(rows.len(), part, r, &places[p]);
-            rows.push(joined.row(&part.rows[r], p, *session));
+        for line in &part.lines[stratum.rows.clone()] {
+            let (r, by) = (rows.len(), &line.by);
+            y[r] = line.y;
+            by_matrix.set_row(r, &by.fixed_rows::<OF_BIAS>(0).transpose());
+            let of_triad = part.free.iter().copied().chain(OF_BIAS..12);
+            let all = of_triad.map(|k| by[k]).chain(line.own.iter().copied());
+            for (place, value) in places[p].iter().zip(all) {
+                nuisance[(r, *place)] = value;
+            }
+            let (row, offset) = (&line.row, first_condition[p]);
+            rows.push(Row {
+                conditions: row.conditions.start + offset..row.conditions.end + offset,
+                weights: row.weights.clone(),
+                dwells: row.dwells.map(|d| d + first[*session]),
+                moving: row.moving,
+            });
         }
         stratum.rows = from..rows.len();
         stratum.session = *session;
@@ -179,27 +111,37 @@ pub(super) fn join(sensor: Sensor, parts: Vec<(usize, Part)>, sessions: usize) -
         }
         strata.push(stratum);
     }
-    let temperature = joined.temperature;
+    // The columns of the first recording come first.
+    let change = from_centre(&head.centre);
+    let mut parameters = DMatrix::zeros(12, places[0].len());
+    for (k, of) in head.free.iter().copied().chain(OF_BIAS..12).enumerate() {
+        let size = nuisance.column(k).norm();
+        let size = if size > 0.0 { size } else { 1.0 };
+        parameters.set_column(k, &(change.column(of) / size));
+    }
+    let is_unknown = |part: &Part| {
+        part.session.prepared.manifest.latitude_deg.is_none()
+            && part.reference() != Reference::Table
+    };
     Some(Rows {
         sensor,
-        // The columns of the first recording come first.
-        parameters: linear.parameters_of_unit_columns(head, &places[0]),
-        nuisance: unit_columns(&linear.nuisance),
-        y: linear.y,
-        by_matrix: linear.by_matrix,
+        parameters,
+        nuisance: unit_columns(&nuisance),
+        y,
+        by_matrix,
         strata,
-        earth_unknown: parts.iter().all(|p| p.1.earth_unknown),
-        figure,
-        judged: (judged.iter().sum(), together),
+        earth_unknown: parts.iter().all(|p| is_unknown(&p.1)),
+        observable,
+        judged: (judged.iter().sum(), observable.components()),
         rows,
-        conditions: joined.conditions,
-        block: joined.block,
+        conditions,
+        block,
         without_self_heating: temperature
             .iter()
             .map(|w| without_self_heating(w))
             .collect(),
         temperature,
-        first: joined.first,
+        first,
         quantities: std::sync::OnceLock::new(),
     })
 }

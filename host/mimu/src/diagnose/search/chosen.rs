@@ -48,6 +48,11 @@ impl Chosen {
     }
 }
 
+/// The others of `all`.
+pub(in crate::diagnose) fn without(all: &[Chosen], k: usize) -> Vec<Chosen> {
+    [&all[..k], &all[k + 1..]].concat()
+}
+
 /// A candidate that would explain the rows nearly as well in the place of another.
 #[derive(Debug, Clone, Serialize)]
 pub struct Alternative {

@@ -1,6 +1,6 @@
 //! One effect after the other, each tested again beside the others.
 
-use super::chosen::{Alternative, Chosen, score};
+use super::chosen::{Alternative, Chosen, score, without};
 use super::{CONFUSED, FALSE_FOUND, FALSE_LISTED, Found, MOST, Search};
 use crate::diagnose::variance::Fitted;
 use crate::effects::candidate::Candidate;
@@ -112,8 +112,7 @@ impl Search<'_> {
     ) -> Option<bool> {
         let mut best: Option<(f64, usize, Chosen)> = None;
         for k in first..chosen.len() {
-            let mut rest = chosen.clone();
-            let mut one = rest.remove(k);
+            let (mut one, rest) = (chosen[k].clone(), without(chosen, k));
             let null = self.fit(&rest)?;
             one.drop = (null.deviance - now.deviance).max(0.0);
             let rivals = self.others(&rest, &null).into_iter();
@@ -167,12 +166,11 @@ impl Search<'_> {
         k: usize,
         now: &Fitted,
     ) -> Option<(f64, f64, Fitted)> {
-        let mut rest = chosen.to_vec();
-        let one = rest.remove(k);
-        let without = self.fit(&rest)?;
+        let (one, rest) = (&chosen[k], without(chosen, k));
+        let null = self.fit(&rest)?;
         let columns = self.model(&rest).ncols();
-        let drop = (without.deviance - now.deviance).max(0.0);
+        let drop = (null.deviance - now.deviance).max(0.0);
         let p = self.chance(drop, one.columns.ncols(), columns, &one.candidate);
-        Some((drop, p, without))
+        Some((drop, p, null))
     }
 }

@@ -1,6 +1,6 @@
 //! Screens all candidates by the share of the scatter that each explains, with the noise of the model so far.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::{COEFFICIENT, Chosen, Search, exceeds};
@@ -29,10 +29,9 @@ impl Search<'_> {
         let Some(whitener) = self.variance.whitener(&null.components) else {
             return Vec::new();
         };
-        let y = DMatrix::from_column_slice(self.rows.y.len(), 1, self.rows.y.as_slice());
-        let (white, y) = (whitener.whiten(&self.model(chosen)), whitener.whiten(&y));
-        let others = white.qr().q();
-        let left = across(&others, &y);
+        let others = whitener.whiten(&self.model(chosen)).qr().q();
+        let y = whitener.vector(&self.rows.y);
+        let left = &y - &others * others.tr_mul(&y);
         let total = left.norm_squared();
         let taken = |c: &Candidate| chosen.iter().any(|k| k.candidate.is_variant_of(c));
         let mut found: Vec<Screened> = (0..self.candidates.len())
@@ -77,7 +76,7 @@ impl Search<'_> {
     fn explained(
         &self,
         others: &DMatrix<f64>,
-        left: &DMatrix<f64>,
+        left: &DVector<f64>,
         total: f64,
         white: &DMatrix<f64>,
     ) -> Option<(f64, f64)> {
@@ -94,9 +93,7 @@ impl Search<'_> {
         let svd = z.svd(true, false);
         let rank = svd.singular_values.iter().filter(|s| **s > 1e-4).count();
         let u = svd.u?;
-        let explained: f64 = (0..rank)
-            .map(|k| u.column(k).dot(&left.column(0)).powi(2))
-            .sum();
+        let explained: f64 = (0..rank).map(|k| u.column(k).dot(left).powi(2)).sum();
         let dof = self.dof(others.ncols() + rank);
         if rank == 0 || dof < 2.0 {
             return None;

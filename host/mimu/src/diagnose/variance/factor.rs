@@ -48,11 +48,6 @@ impl Axes {
     pub(super) fn factor(&self, extra_white: f64, floor: f64) -> Factor {
         Factor::Diagonal(self.variances.map(|v| (v.max(floor) + extra_white).sqrt()))
     }
-
-    /// The variances of the rows, if these are independent without a rotation.
-    pub(super) fn standing(&self) -> Option<&DVector<f64>> {
-        self.rotate.is_none().then_some(&self.variances)
-    }
 }
 
 /// A covariance with the element u_i + v_j for rows i < j, such as that of a random walk minus its mean. With independent noise added, its
@@ -234,45 +229,34 @@ impl Factor {
 /// Variance along a direction of common errors, relative to that of the noise, below which it is neglected.
 const NEGLIGIBLE: f64 = 1e-8;
 
-/// Decorrelates rows.
+/// Decorrelates rows, or a choice of them.
 pub struct Whitener<'a> {
-    pub(super) variance: &'a VarianceModel<'a>,
-    pub(super) factors: Vec<Factor>,
+    /// What rotates the rows first; a choice is not rotated.
+    pub(super) rotation: Option<&'a VarianceModel<'a>>,
+    pub(super) parts: Vec<(Range<usize>, Factor)>,
 }
 
 impl Whitener<'_> {
     /// `matrix`, a row for each of the rows, decorrelated and in sigmas.
     pub fn whiten(&self, matrix: &DMatrix<f64>) -> DMatrix<f64> {
-        self.whiten_rotated(self.variance.rotate(matrix))
+        let rotated = self.rotation.map(|variance| variance.rotate(matrix));
+        self.whiten_rotated(rotated.unwrap_or_else(|| matrix.clone()))
+    }
+
+    /// The same of one column.
+    pub fn vector(&self, column: &DVector<f64>) -> DVector<f64> {
+        let matrix = DMatrix::from_columns(std::slice::from_ref(column));
+        self.whiten(&matrix).column(0).into_owned()
     }
 
     /// The same of a matrix that [`VarianceModel::rotate`] has rotated.
     pub fn whiten_rotated(&self, mut rotated: DMatrix<f64>) -> DMatrix<f64> {
-        for (stratum, factor) in self.variance.rows.strata.iter().zip(&self.factors) {
-            let (from, count) = (stratum.rows.start, stratum.rows.len());
-            let mut part = rotated.rows(from, count).into_owned();
+        for (rows, factor) in &self.parts {
+            let mut part = rotated.rows_range(rows.clone()).into_owned();
             factor.whiten(&mut part);
-            rotated.rows_mut(from, count).copy_from(&part);
+            rotated.rows_range_mut(rows.clone()).copy_from(&part);
         }
         rotated
-    }
-}
-
-/// Decorrelates a choice of rows.
-pub struct DecorrelatedChoice {
-    pub(super) parts: Vec<(Range<usize>, Factor)>,
-}
-
-impl DecorrelatedChoice {
-    /// `matrix`, a row for each of the chosen rows, decorrelated and in sigmas.
-    pub fn whiten(&self, matrix: &DMatrix<f64>) -> DMatrix<f64> {
-        let mut out = matrix.clone();
-        for (rows, factor) in &self.parts {
-            let mut part = matrix.rows_range(rows.clone()).into_owned();
-            factor.whiten(&mut part);
-            out.rows_range_mut(rows.clone()).copy_from(&part);
-        }
-        out
     }
 }
 

@@ -10,7 +10,7 @@
 use nalgebra::{Cholesky, DMatrix};
 
 use super::{Components, NormalEquations, VarianceModel};
-use crate::diagnose::rows::{RowFigure, Rows, Stratum};
+use crate::diagnose::rows::{Rows, Stratum};
 
 /// Most steps of a walk, of all recordings together. A walk of finer steps differs from it by less than the noise of its dwells.
 const STEPS: usize = 32;
@@ -32,7 +32,7 @@ impl CommonWalk {
     /// Of the biases of all recordings of `rows`; `None` if a walk is not to be sought: the wander is known, or the rows of each stratum alone show it.
     pub fn of(rows: &Rows) -> Option<Self> {
         let unknown = |s: &Stratum| s.random_walk.is_some() && !s.wander_known;
-        if rows.figure == RowFigure::Input || !rows.strata.iter().any(unknown) {
+        if rows.is_of_known_inputs() || !rows.strata.iter().any(unknown) {
             return None;
         }
         let spans = rows.spans();
@@ -90,10 +90,7 @@ fn deviance(strata: &[NormalEquations], walk: usize, sizes: [f64; 3]) -> Option<
         .collect();
     let scaled = DMatrix::from_fn(p, p, |i, j| reduced[(i, j)] / (scale[i] * scale[j]));
     let right = DMatrix::from_fn(p, 1, |i, _| reduced[(i, p)] / scale[i]);
-    let explained = match p {
-        0 => 0.0,
-        _ => Cholesky::new(scaled)?.solve(&right).dot(&right),
-    };
+    let explained = Cholesky::new(scaled)?.solve(&right).dot(&right);
     Some(deviance + (reduced[(p, p)] - explained).max(0.0))
 }
 
@@ -113,10 +110,10 @@ impl VarianceModel<'_> {
             .resize_horizontally(count + columns.ncols(), 0.0);
         all.columns_mut(count, columns.ncols()).copy_from(columns);
         let both = self.both(&all);
-        let mut white = start.extra_white.clone();
+        let mut white: Vec<f64> = start.iter().map(|levels| levels[0]).collect();
         let typical: Vec<f64> = self.typical.iter().map(|t| t.0).collect();
         let mut strata: Vec<NormalEquations> = (0..white.len())
-            .map(|s| self.stratum(s, white[s], 0.0, &both))
+            .map(|s| self.stratum(s, [white[s], 0.0], &both))
             .collect::<Option<_>>()?;
         // K of a walk that reaches the noise of a row within the recording, by axis.
         let unit = |axis: usize| {
@@ -149,7 +146,7 @@ impl VarianceModel<'_> {
             }
             for s in 0..white.len() {
                 for extra in tried(white[s], typical[s]) {
-                    let Some(new) = self.stratum(s, extra, 0.0, &both) else {
+                    let Some(new) = self.stratum(s, [extra, 0.0], &both) else {
                         continue;
                     };
                     let old = std::mem::replace(&mut strata[s], new);
