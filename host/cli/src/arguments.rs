@@ -7,9 +7,11 @@ use mimu::data_sheet::Part;
 use mimu::judgement::Judgement;
 use mimu::noise::noise_file::NoiseFile;
 use mimu::prepared::Prepared;
-use mimu::quantity::Sensor;
+use mimu::quantity::{Sensor, normal_gravity};
+use mimu::readable::STANDARD_GRAVITY;
 use mimu::signal::dwell::Keep;
 use mimu::signal::stillness::{DwellSearch, STILL_FACTOR, Steps};
+use mimu::warning::Warning;
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{Reference, WholeTurns};
 use mimu_wizard::procedure::Targets;
@@ -19,7 +21,7 @@ use crate::status::Status;
 #[derive(Args)]
 pub(crate) struct StillArgs {
     /// For dwells that are found: largest variance of a still window, as a multiple of the quietest
-    #[arg(long = "still", value_name = "FACTOR", default_value_t = STILL_FACTOR, value_parser = still)]
+    #[arg(long = "still", value_name = "FACTOR", default_value_t = STILL_FACTOR, value_parser = |t: &str| number(t, 1.0, 1e9))]
     pub(crate) factor: f64,
     /// Where dwells come from: given by the column step, or found by stillness [default: the column if there is one]
     #[arg(long = "steps", value_enum, value_name = "WHENCE")]
@@ -77,10 +79,21 @@ fn keep(text: &str) -> std::result::Result<Keep, String> {
         .map_err(|_| "write `all`, or the numbers of dwells separated by commas: 3,12".into())
 }
 
-fn still(text: &str) -> std::result::Result<f64, String> {
+/// A number within these limits.
+pub(crate) fn number(text: &str, lowest: f64, highest: f64) -> std::result::Result<f64, String> {
     match text.parse() {
-        Ok(f) if (1.0..=1e9).contains(&f) => Ok(f),
-        _ => Err("write a number from 1 to 1e9".into()),
+        Ok(v) if (lowest..=highest).contains(&v) => Ok(v),
+        _ => Err(format!("write a number from {lowest:?} to {highest:?}")),
+    }
+}
+
+/// Two temperatures, °C, the lower first: `-20..60`.
+pub(crate) fn range_c(text: &str) -> std::result::Result<[f64; 2], String> {
+    let ends = text.split_once("..");
+    let ends = ends.and_then(|(from, to)| Some([from.parse().ok()?, to.parse().ok()?]));
+    match ends {
+        Some([from, to]) if -100.0 <= from && from < to && to <= 300.0 => Ok([from, to]),
+        _ => Err("write FROM..TO in degrees Celsius, as in -20..60".into()),
     }
 }
 
@@ -289,6 +302,30 @@ impl SensorArg {
             Self::Accel => Sensor::Accel,
         }
     }
+}
+
+/// Gravity, m/s², as given or of the latitude, and what is said of it where no height explains it; `None` if neither is given.
+pub(crate) fn known_gravity(
+    gravity: Option<f64>,
+    latitude_deg: Option<f64>,
+) -> Option<(f64, Option<String>)> {
+    let off = |g| latitude_deg.and_then(|at| Warning::of_gravity(g, at));
+    let given = gravity.map(|g| (g, off(g).map(|w| w.to_string())));
+    given.or(latitude_deg.map(|at| (normal_gravity(at), None)))
+}
+
+/// Gravity where nothing is known of the place, m/s², and what is said of it.
+pub(crate) fn assumed_gravity() -> (f64, Option<String>) {
+    let said = "gravity is assumed to be 9.80665 m/s². It ranges from 9.78 at the equator to 9.83 at the poles, and every scale factor of the accelerometer errs by the same ratio: give --gravity or --latitude";
+    (STANDARD_GRAVITY, Some(said.into()))
+}
+
+/// The gravity, after what is said of it was printed.
+pub(crate) fn warned((gravity, said): (f64, Option<String>)) -> f64 {
+    if let Some(said) = said {
+        eprintln!("warning: {said}");
+    }
+    gravity
 }
 
 /// The wizard's targets, with those of `--target NAME=VALUE` in place of the defaults.

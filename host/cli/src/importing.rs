@@ -4,8 +4,6 @@ use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, CommandFactory};
-use mimu::quantity::normal_gravity;
-use mimu::warning::Warning;
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::look::{Given, Look};
 use mimu_recording::{
@@ -14,7 +12,7 @@ use mimu_recording::{
 };
 
 use crate::Cli;
-use crate::arguments::JsonArgs;
+use crate::arguments::{JsonArgs, assumed_gravity, known_gravity};
 use crate::output::{check_outputs, progress, quoted};
 
 #[derive(Args)]
@@ -233,15 +231,11 @@ pub(crate) fn imported_log(
 
 /// Size of gravity, m/s², and what is said where it is assumed.
 fn gravity_of(args: &ImportArgs, reference: Reference) -> (f64, Option<String>) {
-    match (args.log.gravity_mps2, args.log.latitude_deg) {
-        (Some(gravity), latitude) => {
-            let off = latitude.and_then(|at| Warning::of_gravity(gravity, at));
-            (gravity, off.map(|w| w.to_string()))
-        }
-        (None, Some(latitude)) => (normal_gravity(latitude), None),
-        (None, None) if reference == Reference::Table => (9.80665, None),
-        (None, None) => (9.80665, Some("gravity is assumed to be 9.80665 m/s². It ranges from 9.78 at the equator to 9.83 at the poles, and every scale factor of the accelerometer errs by the same ratio: give --gravity or --latitude".to_string())),
-    }
+    let known = known_gravity(args.log.gravity_mps2, args.log.latitude_deg);
+    known.unwrap_or_else(|| {
+        let (gravity, said) = assumed_gravity();
+        (gravity, said.filter(|_| reference != Reference::Table))
+    })
 }
 
 /// Takes over what a look at the files has found, where the command leaves it open.

@@ -91,6 +91,44 @@ impl Progress {
     }
 }
 
+/// Files of results, and the text that names them. They are published only after all of them were written.
+pub(crate) struct Results {
+    text: String,
+    files: Vec<Staged>,
+}
+
+impl Results {
+    /// Results with this text so far.
+    pub(crate) fn new(text: String) -> Self {
+        let files = Vec::new();
+        Self { text, files }
+    }
+
+    /// Appends to the text.
+    pub(crate) fn say(&mut self, text: &str) {
+        self.text += text;
+    }
+
+    /// Writes what `make` gives to the file at `path`, if one is asked for, and names it as `what`.
+    pub(crate) fn file<C: Into<Vec<u8>>>(
+        &mut self,
+        what: &str,
+        path: Option<&PathBuf>,
+        make: impl FnOnce() -> Result<C>,
+    ) -> Result<()> {
+        if let Some(path) = path {
+            self.files.push(stage(path, make()?)?);
+            self.text += &format!("\n{what}: {}\n", path.display());
+        }
+        Ok(())
+    }
+
+    /// Prints the text as [`print`] does, and publishes the files.
+    pub(crate) fn print(self, json: &JsonArgs, result: &impl Serialize) -> Result<()> {
+        print(json, &self.text, result, self.files)
+    }
+}
+
 /// Prints the text, or writes the JSON and prints the text unless both would go to standard output. The files are published only after all of them
 /// were written.
 pub(crate) fn print(

@@ -72,7 +72,7 @@ pub fn check(
     let remembering = effects.iter().filter(|e| e.remembers());
     let not_judged_for = remembering.map(DeviceEffect::to_string).collect();
     let who = session.hello()?;
-    let held = who.stored.as_ref().map(|s| s.hash);
+    let held = who.stored_hash();
     let powered_for_ms = who.powered_for_ms;
     if held != Some(image.hash) {
         let problem = match held {

@@ -320,6 +320,11 @@ impl Identity {
         [self.sensors.gyro.nominal(), self.sensors.accel.nominal()]
     }
 
+    /// Hash of the stored calibration.
+    pub fn stored_hash(&self) -> Option<Hash> {
+        self.stored.as_ref().map(|s| s.hash)
+    }
+
     /// Names of the optional functions.
     pub fn capability_names(&self) -> Vec<&'static str> {
         names(self.capabilities).collect()

@@ -11,6 +11,7 @@ use serde::Serialize;
 
 use super::received::{Answer, Event};
 use super::session::{PATIENCE, SILENCE, Session};
+use super::stream::Stream;
 use mimu::quantity::Sensor;
 use mimu_recording::error::{Error, Result};
 
@@ -189,10 +190,7 @@ impl<'a> BankRun<'a> {
     /// Begins the stream, and waits for its first batch.
     fn begin_stream(&mut self) -> Result<()> {
         self.last = Instant::now();
-        self.session.begin_stream(Request::Stream {
-            raw: true,
-            compensated: false,
-        })?;
+        self.session.begin_stream(Stream::Raw.request())?;
         // The input is set only after the first batch: the samples before it are missing here, and the bank must not use them.
         self.listen_until(self.samples.len() + 1)
     }

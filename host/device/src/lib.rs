@@ -52,7 +52,7 @@ pub use received::{Answer, Event, LineCount, Received, Receiver, Samples};
 pub use result::{Counted, DeviceResult};
 pub use self_test::{SelfTested, self_test};
 pub use session::{Session, refused};
-pub use stream::{Moments, Stream, Streamed, Thermometer, stream};
+pub use stream::{Moments, Stream, Streamed, Thermometer, look, stream};
 pub use test_result::{TestResult, Verdict};
 pub use trim::{Pose, SHORTEST_TRIM_S, Trimmed, TrimmedTriad, trim};
 pub use upload::{Uploaded, download, outside_now, upload};

@@ -8,7 +8,9 @@ use mimu_core::wire::{
 use serde::Serialize;
 
 use super::identity::{Identity, beginning};
+use super::reading::shortest;
 use super::test_result::TestResult;
+use mimu_recording::error::{Error, Result};
 
 /// Answer to a call.
 #[derive(Debug, Clone, PartialEq)]
@@ -49,6 +51,29 @@ pub struct Samples {
     pub dies_c: Option<mimu_core::PerSensor<f32>>,
     /// Consecutive samples. The first has the number [`BatchHead::first`].
     pub values: Vec<Sample<f32>>,
+}
+
+impl Samples {
+    /// Gyro x, y, z, accelerometer x, y, z of each sample, as short decimal numbers.
+    ///
+    /// # Errors
+    /// One of them is not a number; `place` names the device.
+    pub fn rows(&self, place: &str) -> Result<Vec<[f64; 6]>> {
+        let row = |sample: &Sample<f32>| {
+            let (g, a) = (sample.gyro, sample.accel);
+            let row = [g.x, g.y, g.z, a.x, a.y, a.z];
+            if row.iter().all(|v| v.is_finite()) {
+                return Ok(row.map(shortest));
+            }
+            let problem = "the device sent a reading that is not a number";
+            Err(Error::device(
+                place,
+                problem,
+                "reset the board, and report this",
+            ))
+        };
+        self.values.iter().map(row).collect()
+    }
 }
 
 /// A message that the device sends without a call.

@@ -12,7 +12,7 @@ use serde::Serialize;
 use super::identity::TriadInfo;
 use super::received::Answer;
 use super::session::Session;
-use super::stream::{Moments, Stream, Streamed, stream};
+use super::stream::{Moments, look};
 use super::test_result::{TestResult, Verdict};
 use mimu_recording::error::Result;
 
@@ -49,13 +49,13 @@ impl SelfTested {
 
 /// Runs the self-test, and measures the raw stream before and after. Takes two seconds.
 pub fn self_test(session: &mut Session) -> Result<SelfTested> {
-    let before = look(session)?;
+    let before = look(session, LOOK)?;
     let purpose = "to test its sensors";
     let test = match session.call(Request::SelfTest, purpose, PATIENCE)? {
         Answer::SelfTest(test) => test,
         _ => return Err(session.unexpected(purpose)),
     };
-    let after = look(session)?;
+    let after = look(session, LOOK)?;
     let limits = session.who().sensors.as_ref().zip(PerSensor {
         gyro: STILL_GYRO,
         accel: STILL_ACCEL,
@@ -70,10 +70,6 @@ pub fn self_test(session: &mut Session) -> Result<SelfTested> {
         results: test,
         moved: moved.or_else(|| turned(&before.gyro, &session.who().sensors.gyro)),
     })
-}
-
-fn look(session: &mut Session) -> Result<Streamed> {
-    stream(session, Stream::Raw, Some(LOOK), || false, |_, _, _| Ok(()))
 }
 
 /// Describes an even turn: a rate that exceeds what the part's data sheet allows at rest.

@@ -22,6 +22,16 @@ pub enum Stream {
     Compensated,
 }
 
+impl Stream {
+    /// The request for it.
+    pub fn request(self) -> Request<'static> {
+        Request::Stream {
+            raw: self == Self::Raw,
+            compensated: self == Self::Compensated,
+        }
+    }
+}
+
 /// Summary of a stream: the result of `mimu device stream`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Streamed {
@@ -101,6 +111,17 @@ impl Streamed {
 /// How often a stream is requested before its first sample.
 const ASKED: u32 = 4;
 
+/// The summary of `duration` of the raw stream.
+pub fn look(session: &mut Session, duration: Duration) -> Result<Streamed> {
+    stream(
+        session,
+        Stream::Raw,
+        Some(duration),
+        || false,
+        |_, _, _| Ok(()),
+    )
+}
+
 /// Receives samples for `duration` of the device's time, or until `stop` returns true. `take` gets each sample with its number.
 pub fn stream(
     session: &mut Session,
@@ -115,19 +136,13 @@ pub fn stream(
     let mut expected: Option<u32> = None;
     let mut last = Instant::now();
     let before = session.count();
-    let begin = |session: &mut Session| {
-        session.begin_stream(Request::Stream {
-            raw: which == Stream::Raw,
-            compensated: which == Stream::Compensated,
-        })
-    };
-    begin(session)?;
+    session.begin_stream(which.request())?;
     let mut asked = 1;
     'all: while !stop() {
         let event = match session.stream_event(last, "stream") {
             // A board that is still starting, or that has just restarted, has not kept the request.
             Err(_) if expected.is_none() && asked < ASKED => {
-                begin(session)?;
+                session.begin_stream(which.request())?;
                 (asked, last) = (asked + 1, Instant::now());
                 continue;
             }

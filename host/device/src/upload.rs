@@ -12,7 +12,7 @@ use super::image::Image;
 use super::origin;
 use super::received::Answer;
 use super::session::{PATIENCE, Session, refused};
-use super::stream::{Stream, stream};
+use super::stream::look;
 use mimu::calibration::Calibration;
 use mimu_recording::error::{Error, Result};
 
@@ -59,7 +59,7 @@ pub fn upload(
     other_unit: bool,
     progress: impl Fn(f64),
 ) -> Result<Uploaded> {
-    let before = session.hello()?.stored.as_ref().map(|s| s.hash);
+    let before = session.hello()?.stored_hash();
     let repeated = session.repeated();
     let was_there = before == Some(image.hash);
     let mut restarts = 0;
@@ -148,21 +148,12 @@ fn send(
         Answer::Done => {}
         // Either the device restarted, or it stored the calibration and its answer was lost. The greeting distinguishes the two.
         Answer::Refused(Refusal::NoUpload) => {
-            return Ok(session
-                .hello()?
-                .stored
-                .as_ref()
-                .is_some_and(|s| s.hash == hash));
+            return Ok(session.hello()?.stored_hash() == Some(hash));
         }
         Answer::Refused(refusal) => return Err(refused(session.port(), purpose, &refusal)),
         _ => return Err(session.unexpected(purpose)),
     }
-    if session
-        .hello()?
-        .stored
-        .as_ref()
-        .is_none_or(|s| s.hash != hash)
-    {
+    if session.hello()?.stored_hash() != Some(hash) {
         return Err(Error::device(
             session.port(),
             "it reports the calibration as stored, but greets with another one",
@@ -182,7 +173,7 @@ pub fn outside_now(session: &mut Session, calibration: &Calibration) -> Result<O
         Some(_) => 0.0,
         None => BEYOND_C,
     };
-    let seen = stream(session, Stream::Raw, Some(LOOK), || false, |_, _, _| Ok(()))?;
+    let seen = look(session, LOOK)?;
     let away_k = (from - seen.temp_c).max(seen.temp_c - to);
     Ok((away_k > margin_k).then(|| {
         format!(

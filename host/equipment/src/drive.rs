@@ -12,22 +12,32 @@ pub use text_driver::TextDriver;
 
 use crate::step::Step;
 
-/// Moves the unit, switches its supply, and changes its temperature.
+/// Moves the unit, switches its supply, and changes its temperature. By default a person does all of it.
 pub trait Driver: Send {
     /// Why motion is blocked by the interlock; `None` if it is allowed.
-    fn interlock(&mut self) -> Result<Option<String>>;
+    fn interlock(&mut self) -> Result<Option<String>> {
+        Ok(None)
+    }
 
     /// Begins to move to a step.
-    fn go(&mut self, step: &Step) -> Result<()>;
+    fn go(&mut self, _: &Step) -> Result<()> {
+        Ok(())
+    }
 
     /// Whether it still moves to the step, or turns by an angle.
-    fn busy(&mut self) -> Result<bool>;
+    fn busy(&mut self) -> Result<bool> {
+        Ok(false)
+    }
 
     /// Stops all motion.
-    fn stop(&mut self) -> Result<()>;
+    fn stop(&mut self) -> Result<()> {
+        Ok(())
+    }
 
     /// Switches the supply off and on. `false`: a person has to do it.
-    fn power_cycle(&mut self) -> Result<bool>;
+    fn power_cycle(&mut self) -> Result<bool> {
+        Ok(false)
+    }
 
     /// Whether a person needs instructions.
     fn is_person(&self) -> bool {
@@ -88,6 +98,26 @@ pub struct Limits {
     pub turn_dps: Option<f64>,
 }
 
+impl Limits {
+    /// What of a motion is beyond a limit, in words: its rate about the vertical, the angle of its pose, the rate of its turn.
+    pub(crate) fn beyond(&self, rate_dps: f64, middle_deg: f64, turn_dps: f64) -> Option<String> {
+        let all = [
+            ("a rate in deg/s", rate_dps, self.rate_dps, "rate_dps"),
+            (
+                "a tilt in degrees",
+                middle_deg,
+                self.middle_deg,
+                "middle_deg",
+            ),
+            ("a turn in deg/s", turn_dps, self.turn_dps, "turn_dps"),
+        ];
+        all.into_iter().find_map(|(what, value, limit, key)| {
+            let limit = limit.filter(|limit| value.abs() > *limit)?;
+            Some(format!("{what} of {value:.1} is beyond {key} = {limit}"))
+        })
+    }
+}
+
 /// Limits of a chamber.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ChamberLimits {
@@ -106,26 +136,6 @@ pub struct ChamberLimits {
 pub struct Person;
 
 impl Driver for Person {
-    fn interlock(&mut self) -> Result<Option<String>> {
-        Ok(None)
-    }
-
-    fn go(&mut self, _: &Step) -> Result<()> {
-        Ok(())
-    }
-
-    fn busy(&mut self) -> Result<bool> {
-        Ok(false)
-    }
-
-    fn stop(&mut self) -> Result<()> {
-        Ok(())
-    }
-
-    fn power_cycle(&mut self) -> Result<bool> {
-        Ok(false)
-    }
-
     fn is_person(&self) -> bool {
         true
     }

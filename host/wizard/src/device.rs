@@ -3,11 +3,11 @@
 use std::time::{Duration, Instant};
 
 use mimu::signal::increment::pause_periods;
-use mimu_core::wire::{Request, flags};
+use mimu_core::wire::flags;
 use mimu_device::record::shortest;
-use mimu_device::{Event, Identity, Samples, Session, Started, Stream, stream};
+use mimu_device::{Event, Identity, Samples, Session, Started, Stream, look};
 use mimu_recording::RawUnit;
-use mimu_recording::error::{Error, Result};
+use mimu_recording::error::Result;
 
 use crate::source::{Chunk, Source, SourceEvent, Unit};
 
@@ -36,11 +36,6 @@ pub struct DeviceSource {
     /// Time since power-on at the start of sampling, s.
     powered_for_s: Option<f64>,
 }
-
-const RAW: Request<'_> = Request::Stream {
-    raw: true,
-    compensated: false,
-};
 
 impl DeviceSource {
     /// Opens the port, or the only one where a device answers. `next`: the first tick that it may use.
@@ -99,21 +94,7 @@ impl DeviceSource {
             self.anew = false;
         }
         let tick = (self.zero + number) as u64;
-        let mut values = Vec::with_capacity(samples.values.len());
-        for sample in &samples.values {
-            let mut row = [0.0; 6];
-            for (to, from) in row.iter_mut().zip(sample.gyro.iter().chain(&sample.accel)) {
-                *to = shortest(*from);
-            }
-            if row.iter().any(|v| !v.is_finite()) {
-                return Err(Error::device(
-                    self.session.port(),
-                    "the device sent a reading that is not a number",
-                    "reset the board, and report this",
-                ));
-            }
-            values.push(row);
-        }
+        let values = samples.rows(self.session.port())?;
         self.next = tick + values.len() as u64;
         Ok(SourceEvent::Samples(Chunk {
             tick,
@@ -139,7 +120,7 @@ fn settled_rate_hz(session: &mut Session) -> Result<f64> {
         return Ok(rate_hz);
     }
     for _ in 0..LOOKS {
-        let seen = stream(session, Stream::Raw, Some(LOOK), || false, |_, _, _| Ok(()))?;
+        let seen = look(session, LOOK)?;
         let before_hz = std::mem::replace(&mut rate_hz, seen.rate_hz);
         if (rate_hz / before_hz - 1.0).abs() < SETTLED {
             break;
@@ -163,7 +144,7 @@ impl Source for DeviceSource {
 
     fn next(&mut self) -> Result<SourceEvent> {
         if !self.streaming {
-            self.session.begin_stream(RAW)?;
+            self.session.begin_stream(Stream::Raw.request())?;
             (self.streaming, self.heard) = (true, Instant::now());
         }
         match self.session.event()? {

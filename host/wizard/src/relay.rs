@@ -7,7 +7,7 @@ use std::sync::mpsc::{Receiver, TryRecvError};
 use mimu_recording::error::{Error, Result};
 
 use crate::source::SourceEvent;
-use crate::station::{Connect, Line, Station, StationEvent, other};
+use crate::station::{Connect, Line, Station, other};
 use crate::text::{Text, TextBoard};
 use crate::turn::pause;
 
@@ -43,13 +43,13 @@ pub fn relayed(text: Text, rate_hz: Option<f64>, arrivals: Receiver<Stamped>) ->
         Box::pin(async move {
             loop {
                 match line.news()? {
-                    Some(StationEvent::Back(unit)) => {
+                    Some(SourceEvent::Back(unit)) => {
                         if let Some(wanted) = wanted.filter(|w| *w != unit.id) {
                             return Err(other(&unit.id, &wanted));
                         }
                         return Ok(Station::over(*unit, Box::new(line)));
                     }
-                    Some(StationEvent::Lost(why)) => return Err(why),
+                    Some(SourceEvent::Lost(why)) => return Err(why),
                     Some(_) => {}
                     None => pause().await,
                 }
@@ -68,13 +68,13 @@ struct RelayedText {
     board: Option<TextBoard>,
     /// Whether the present board's greeting was reported.
     greeted: bool,
-    ready: VecDeque<StationEvent>,
+    ready: VecDeque<SourceEvent>,
     /// Why the line is lost; reported once.
     told: Option<String>,
 }
 
 impl Line for RelayedText {
-    fn news(&mut self) -> Result<Option<StationEvent>> {
+    fn news(&mut self) -> Result<Option<SourceEvent>> {
         loop {
             if let Some(event) = self.ready.pop_front() {
                 return Ok(Some(event));
@@ -99,16 +99,11 @@ impl RelayedText {
                     "check the cable, plug the board in, and connect it again: the session goes on";
                 return self.lost(Error::device(&self.text.port, why, remedy));
             }
-            Arrival::Opened => {
-                self.greeted = false;
-                self.board = Some(self.opened(at_s));
-                return;
-            }
+            Arrival::Opened => return self.open(at_s),
             // A board that was silent sends again.
             Arrival::Bytes(bytes) => {
                 if self.board.is_none() {
-                    self.greeted = false;
-                    self.board = Some(self.opened(at_s));
+                    self.open(at_s);
                 }
                 bytes
             }
@@ -123,8 +118,9 @@ impl RelayedText {
         }
     }
 
-    fn opened(&self, at_s: f64) -> TextBoard {
-        TextBoard::new(&self.text, self.rate_hz, self.next, at_s)
+    fn open(&mut self, at_s: f64) {
+        self.greeted = false;
+        self.board = Some(TextBoard::new(&self.text, self.rate_hz, self.next, at_s));
     }
 
     /// Processes what the board has sent.
@@ -139,19 +135,18 @@ impl RelayedText {
             let unit = board.unit().clone();
             (self.greeted, self.told) = (true, None);
             self.rate_hz = Some(unit.rate_hz);
-            self.ready.push_back(StationEvent::Back(Box::new(unit)));
+            self.ready.push_back(SourceEvent::Back(Box::new(unit)));
         }
         loop {
-            self.ready.push_back(match board.next(at_s)? {
+            match board.next(at_s)? {
                 SourceEvent::Nothing => return Ok(()),
-                SourceEvent::Restarted(why) => StationEvent::Restarted(why),
-                SourceEvent::Note(words) => StationEvent::Note(words),
-                SourceEvent::Clock(rate) => StationEvent::Clock(rate),
-                SourceEvent::Samples(chunk) => {
-                    self.next = chunk.tick + chunk.values.len() as u64;
-                    StationEvent::Samples(chunk)
+                event => {
+                    if let SourceEvent::Samples(chunk) = &event {
+                        self.next = chunk.end();
+                    }
+                    self.ready.push_back(event);
                 }
-            });
+            }
         }
     }
 
@@ -161,7 +156,7 @@ impl RelayedText {
         // A port with the wrong baud rate causes the same error every five seconds.
         if self.told.as_ref() != Some(&words) {
             self.told = Some(words);
-            self.ready.push_back(StationEvent::Lost(why));
+            self.ready.push_back(SourceEvent::Lost(why));
         }
     }
 }
@@ -201,11 +196,11 @@ mod tests {
         let (mut said, mut samples) = (Vec::new(), Vec::new());
         while let Some(event) = station.news().unwrap() {
             match event {
-                StationEvent::Samples(chunk) => {
+                SourceEvent::Samples(chunk) => {
                     samples.extend((chunk.tick..).zip(chunk.values.iter().map(|v| v[3])));
                 }
-                StationEvent::Lost(why) => said.push(why.to_string()),
-                StationEvent::Back(unit) => said.push(format!("{} is back", unit.name)),
+                SourceEvent::Lost(why) => said.push(why.to_string()),
+                SourceEvent::Back(unit) => said.push(format!("{} is back", unit.name)),
                 other => said.push(format!("{other:?}")),
             }
         }

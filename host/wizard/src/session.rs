@@ -24,7 +24,7 @@ use crate::source::Unit;
 use crate::station::Connect;
 use crate::unit_session::UnitSession;
 use crate::verdict::{Judged, judge, prepared};
-use crate::wizard::{Ended, Wizard};
+use crate::wizard::{Phased, Stop, Wizard};
 use mimu_equipment::drive::Driver;
 
 /// A unit to calibrate.
@@ -138,10 +138,13 @@ pub async fn run(
     let ended = session.carry_out().await;
     // In every case, stop the table.
     let stopped = session.wizard.driver.stop();
-    let ended = ended?;
+    let cancelled = match ended {
+        Err(Stop::Failed(error)) => return Err(error),
+        Err(Stop::Cancelled) => true,
+        Ok(()) => false,
+    };
     stopped?;
-    let outcomes = session.outcomes();
-    Ok(Outcome::of(outcomes, ended == Ended::Cancelled))
+    Ok(Outcome::of(session.outcomes(), cancelled))
 }
 
 /// Refuses a unit whose readings are in another unit than those of the prior.
@@ -242,37 +245,29 @@ fn add_mounting_uncertainty(fitted: &mut Fit, half_width_deg: f64) {
     }
 }
 
-macro_rules! or_cancelled {
-    ($ended:expr) => {
-        if $ended? == Ended::Cancelled {
-            return Ok(Ended::Cancelled);
-        }
-    };
-}
-
 mod effects;
 
 impl OpenSession<'_> {
-    async fn carry_out(&mut self) -> Result<Ended> {
-        or_cancelled!(self.warm_up().await);
+    async fn carry_out(&mut self) -> Phased<()> {
+        self.warm_up().await?;
         let wizard = &mut self.wizard;
         let steps = wizard.config.steps.clone();
         let words = format!("{} dwells are planned", steps.len());
         wizard.begin_phase(Phase::Calibration, words);
-        or_cancelled!(wizard.dwells(Part::Calibration, &steps).await);
+        wizard.dwells(Part::Calibration, &steps).await?;
         if wizard.config.whole_turns.is_some() {
             let words = "about each axis, both ways; they give the gyro's scale factors";
             wizard.begin_phase(Phase::WholeTurns, words.into());
         }
-        or_cancelled!(wizard.whole_turns(Part::Calibration).await);
+        wizard.whole_turns(Part::Calibration).await?;
         self.finish()?;
         let fits = self.fits()?;
         let wizard = &mut self.wizard;
         let steps = wizard.config.verification.clone();
         let words = format!("{} poses that the fit has not used", steps.len());
         wizard.begin_phase(Phase::Verification, words);
-        or_cancelled!(wizard.dwells(Part::Verification, &steps).await);
-        or_cancelled!(wizard.whole_turns(Part::Verification).await);
+        wizard.dwells(Part::Verification, &steps).await?;
+        wizard.whole_turns(Part::Verification).await?;
         self.finish()?;
         self.wizard
             .begin_phase(Phase::Store, "storing the verified calibration".into());
@@ -280,7 +275,7 @@ impl OpenSession<'_> {
         for (k, fitted) in fits.into_iter().enumerate() {
             let affine = self.affine_calibration(k, fitted)?;
             if affine.passed && affine.rough.is_none() {
-                or_cancelled!(self.store(k, PLAIN, &affine.calibration).await);
+                self.store(k, PLAIN, &affine.calibration).await?;
             }
             plain.push(affine);
         }
@@ -293,15 +288,15 @@ impl OpenSession<'_> {
             found.push(self.diagnose(k, plain)?);
         }
         if found.iter().any(Option::is_some) {
-            or_cancelled!(self.with_effects(&plain, found).await);
+            self.with_effects(&plain, found).await?;
         }
-        or_cancelled!(self.store_rough(&plain).await);
+        self.store_rough(&plain).await?;
         self.wizard.journal(&Entry::Done)?;
-        Ok(Ended::Done)
+        Ok(())
     }
 
     /// Waits until the units can be used, and shows what they are.
-    async fn warm_up(&mut self) -> Result<Ended> {
+    async fn warm_up(&mut self) -> Phased<()> {
         let wizard = &mut self.wizard;
         let words = wizard.config.gravity_words();
         wizard.tell(Event::Note { words });
@@ -315,7 +310,7 @@ impl OpenSession<'_> {
             }
         };
         wizard.begin_phase(Phase::WarmUp, words);
-        or_cancelled!(wizard.warm_up().await);
+        wizard.warm_up().await?;
         wizard.look_at_devices().await
     }
 
@@ -376,7 +371,7 @@ impl OpenSession<'_> {
     }
 
     /// Stores rough calibrations where nothing else was stored, if the user agrees.
-    async fn store_rough(&mut self, plain: &[AffineCalibration]) -> Result<Ended> {
+    async fn store_rough(&mut self, plain: &[AffineCalibration]) -> Phased<()> {
         for (k, plain) in plain.iter().enumerate() {
             let outcome = &self.outcomes[k];
             let Some(why) = plain.rough.as_ref().filter(|_| outcome.stored.is_none()) else {
@@ -387,24 +382,21 @@ impl OpenSession<'_> {
                 found => format!("{why}; the diagnosis found {}", found.join(", ")),
             };
             match self.wizard.ask(&Question::StoreRough(why.clone())).await? {
-                None => return Ok(Ended::Cancelled),
-                Some(true) => or_cancelled!(self.store(k, PLAIN, &plain.calibration).await),
-                Some(false) => self.outcomes[k].notes.push(format!("not stored: {why}")),
+                true => self.store(k, PLAIN, &plain.calibration).await?,
+                false => self.outcomes[k].notes.push(format!("not stored: {why}")),
             }
         }
-        Ok(Ended::Done)
+        Ok(())
     }
 
     /// Writes a calibration and stores it on unit `k`.
-    async fn store(&mut self, k: usize, name: &str, calibration: &Calibration) -> Result<Ended> {
+    async fn store(&mut self, k: usize, name: &str, calibration: &Calibration) -> Phased<()> {
         let path = self.file(k, name);
         stage(&path, calibration.to_toml())?.publish()?;
         let place = path.display().to_string();
-        let ended = self.wizard.store(k, calibration, &place).await?;
-        if ended == Ended::Done {
-            self.outcomes[k].stored = Some(place);
-        }
-        Ok(ended)
+        self.wizard.store(k, calibration, &place).await?;
+        self.outcomes[k].stored = Some(place);
+        Ok(())
     }
 
     /// Replaces the fit by the estimate of the device's filters, if they received all dwells.

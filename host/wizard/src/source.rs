@@ -2,7 +2,7 @@
 
 use mimu_core::compensation::Affine;
 use mimu_device::Session;
-use mimu_recording::error::Result;
+use mimu_recording::error::{Error, Result};
 use mimu_recording::{ClockRate, RawUnit, SensorSettings};
 
 /// The unit at a port.
@@ -49,6 +49,11 @@ pub struct Chunk {
 }
 
 impl Chunk {
+    /// Tick after its last sample.
+    pub fn end(&self) -> u64 {
+        self.tick + self.values.len() as u64
+    }
+
     /// Time of each sample, s, at this nominal rate.
     pub fn times(&self, rate_hz: f64) -> impl Iterator<Item = f64> {
         let (tick, crystal_ns) = (self.tick, self.crystal_ns);
@@ -60,7 +65,7 @@ impl Chunk {
     }
 }
 
-/// An event of a source.
+/// An event of a source, or of the line to it, which may be lost.
 #[derive(Debug)]
 pub enum SourceEvent {
     /// Samples.
@@ -73,6 +78,12 @@ pub enum SourceEvent {
     Clock(ClockRate),
     /// Nothing came for a short while.
     Nothing,
+    /// The line was lost, and why.
+    Lost(Error),
+    /// Another unit is at the port.
+    Other(Error),
+    /// The line is back.
+    Back(Box<Unit>),
 }
 
 /// Samples in order from a unit that may vanish.
@@ -84,10 +95,14 @@ pub trait Source: Send {
     fn next(&mut self) -> Result<SourceEvent>;
 
     /// The session, if this is a mimu device. The stream restarts with the next [`Source::next`], whatever was requested.
-    fn device(&mut self) -> Option<&mut Session>;
+    fn device(&mut self) -> Option<&mut Session> {
+        None
+    }
 
     /// The session for short calls that do not interrupt the stream: no sample is lost.
-    fn aside(&mut self) -> Option<&mut Session>;
+    fn aside(&mut self) -> Option<&mut Session> {
+        None
+    }
 }
 
 /// Opens a source: at the beginning, and again after it was lost. The argument is the first tick that it may use.

@@ -6,32 +6,12 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use mimu_device::Session;
-use mimu_recording::ClockRate;
 use mimu_recording::error::{Argument, Error, Result};
 
-use crate::source::{Chunk, Opener, Source, SourceEvent, Unit};
+use crate::source::{Opener, Source, SourceEvent, Unit};
 
 /// Interval between attempts to reopen a port.
 const AGAIN: Duration = Duration::from_millis(300);
-
-/// An event of a station.
-#[derive(Debug)]
-pub enum StationEvent {
-    /// Samples.
-    Samples(Chunk),
-    /// The device restarted, with its reset cause.
-    Restarted(String),
-    /// Information for the user.
-    Note(String),
-    /// The board's clock, compared with this computer's once more.
-    Clock(ClockRate),
-    /// The line was lost, and why.
-    Lost(Error),
-    /// Another unit is at the port.
-    Other(Error),
-    /// The line is back.
-    Back(Box<Unit>),
-}
 
 /// A task for the session of a mimu device, if there is one.
 pub type Errand = Box<dyn FnOnce(&mut Option<Box<dyn Source>>) + Send>;
@@ -39,7 +19,7 @@ pub type Errand = Box<dyn FnOnce(&mut Option<Box<dyn Source>>) + Send>;
 /// The line to a unit. Its functions never wait.
 pub trait Line {
     /// The next event; `None` if there is none.
-    fn news(&mut self) -> Result<Option<StationEvent>>;
+    fn news(&mut self) -> Result<Option<SourceEvent>>;
 
     /// Passes a task to the device's thread; `false` if there is none.
     fn errand(&self, _: Errand) -> bool {
@@ -70,13 +50,13 @@ pub struct Station {
 
 /// A port and its thread.
 struct Threaded {
-    news: Receiver<StationEvent>,
+    news: Receiver<SourceEvent>,
     errands: Option<Sender<Errand>>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl Line for Threaded {
-    fn news(&mut self) -> Result<Option<StationEvent>> {
+    fn news(&mut self) -> Result<Option<SourceEvent>> {
         match self.news.try_recv() {
             Ok(news) => Ok(Some(news)),
             Err(TryRecvError::Empty) => Ok(None),
@@ -121,9 +101,9 @@ impl Station {
     }
 
     /// The next event; `None` if there is none.
-    pub fn news(&mut self) -> Result<Option<StationEvent>> {
+    pub fn news(&mut self) -> Result<Option<SourceEvent>> {
         let news = self.line.news()?;
-        if let Some(StationEvent::Back(unit)) = &news {
+        if let Some(SourceEvent::Back(unit)) = &news {
             self.unit = (**unit).clone();
         }
         Ok(news)
@@ -201,7 +181,7 @@ fn listen(
     opener: &mut Opener,
     id: &str,
     mut next: u64,
-    tell: &Sender<StationEvent>,
+    tell: &Sender<SourceEvent>,
     to_do: &Receiver<Errand>,
 ) {
     let mut source = Some(source);
@@ -218,16 +198,10 @@ fn listen(
         let news = match &mut source {
             Some(open) => match open.next() {
                 Ok(SourceEvent::Nothing) => continue,
-                Ok(SourceEvent::Restarted(why)) => StationEvent::Restarted(why),
-                Ok(SourceEvent::Note(words)) => StationEvent::Note(words),
-                Ok(SourceEvent::Clock(rate)) => StationEvent::Clock(rate),
-                Ok(SourceEvent::Samples(chunk)) => {
-                    next = chunk.tick + chunk.values.len() as u64;
-                    StationEvent::Samples(chunk)
-                }
+                Ok(event) => event,
                 Err(error) => {
                     source = None;
-                    StationEvent::Lost(error)
+                    SourceEvent::Lost(error)
                 }
             },
             None => match opener(next) {
@@ -235,7 +209,7 @@ fn listen(
                     let unit = open.unit().clone();
                     source = Some(open);
                     told_other.clear();
-                    StationEvent::Back(Box::new(unit))
+                    SourceEvent::Back(Box::new(unit))
                 }
                 Ok(open) => {
                     let found = open.unit().id.clone();
@@ -245,7 +219,7 @@ fn listen(
                         continue;
                     }
                     told_other.clone_from(&found);
-                    StationEvent::Other(other(&found, id))
+                    SourceEvent::Other(other(&found, id))
                 }
                 Err(_) => {
                     std::thread::sleep(AGAIN);
@@ -253,6 +227,9 @@ fn listen(
                 }
             },
         };
+        if let SourceEvent::Samples(chunk) = &news {
+            next = chunk.end();
+        }
         if tell.send(news).is_err() {
             return;
         }

@@ -4,15 +4,13 @@ use std::time::{Duration, Instant};
 
 use mimu::calibration::Calibration;
 use mimu_core::wire::Capabilities;
-use mimu_device::{
-    Image, Session, Started, Stream, Verdict, check, download, self_test, stream, upload,
-};
+use mimu_device::{Image, Session, Started, Verdict, check, download, look, self_test, upload};
 use mimu_recording::error::{Error, Result};
 
 use crate::event::{Event, Question};
 use crate::folder::Entry;
 use crate::turn::rest;
-use crate::wizard::{Ended, Wizard};
+use crate::wizard::{Phased, Wizard};
 
 /// Longest wait for a device to return after a power cycle.
 const BACK: Duration = Duration::from_secs(60);
@@ -28,20 +26,14 @@ fn powered(session: &mut Session) -> Result<Option<f64>> {
     let who = session.hello()?;
     let before_ms = who.powered_for_ms.filter(|_| who.start == Started::PowerOn);
     let rate_hz = who.sample_rate_hz;
-    let seen = stream(
-        session,
-        Stream::Raw,
-        Some(GLANCE),
-        || false,
-        |_, _, _| Ok(()),
-    )?;
+    let seen = look(session, GLANCE)?;
     let samples = f64::from(seen.first.unwrap_or(0));
     Ok(before_ms.map(|ms| f64::from(ms) / 1000.0 + samples / rate_hz))
 }
 
 impl Wizard<'_> {
     /// Runs the self-tests, and saves the calibrations that the devices store.
-    pub async fn look_at_devices(&mut self) -> Result<Ended> {
+    pub async fn look_at_devices(&mut self) -> Phased<()> {
         for k in 0..self.units.len() {
             let unit = &self.units[k];
             let name = unit.name();
@@ -90,36 +82,22 @@ impl Wizard<'_> {
                 passed,
                 words: words.clone(),
             });
-            if !passed {
-                match self.ask(&question).await? {
-                    Some(true) => {}
-                    Some(false) => {
-                        let remedy = "check the wiring of the sensors, keep the unit still, and run the same command";
-                        return Err(Error::device(
-                            name,
-                            format!("the self-test failed: {words}"),
-                            remedy,
-                        ));
-                    }
-                    None => return Ok(Ended::Cancelled),
-                }
+            if !passed && !self.ask(&question).await? {
+                let problem = format!("the self-test failed: {words}");
+                let remedy = "check the wiring of the sensors, keep the unit still, and run the same command";
+                return Err(Error::device(name, problem, remedy).into());
             }
         }
-        Ok(Ended::Done)
+        Ok(())
     }
 
     /// Stores a calibration on unit `k`, reads it back, power-cycles the unit, and compares the device's compensation with the PC's on the same
     /// readings. `place` is the file.
-    pub async fn store(
-        &mut self,
-        k: usize,
-        calibration: &Calibration,
-        place: &str,
-    ) -> Result<Ended> {
+    pub async fn store(&mut self, k: usize, calibration: &Calibration, place: &str) -> Phased<()> {
         let unit = &self.units[k];
         let name = unit.name();
         if !unit.station.unit.is_device {
-            return Ok(Ended::Done);
+            return Ok(());
         }
         let (given, file) = (calibration.clone(), place.to_owned());
         let (hash, effects) = unit.station.with(move |session| {
@@ -137,13 +115,7 @@ impl Wizard<'_> {
             let on_s = self.units[k].station.with(powered)?;
             let since = Instant::now();
             let driven = self.driver.power_cycle()?;
-            let cycled = match driven {
-                true => Some(true),
-                false => self.ask(&Question::PowerCycled).await?,
-            };
-            let Some(cycled) = cycled else {
-                return Ok(Ended::Cancelled);
-            };
+            let cycled = driven || self.ask(&Question::PowerCycled).await?;
             self.wait_for(k, hash).await?;
             if !cycled {
                 break "not tested with a power cycle".to_string();
@@ -176,36 +148,32 @@ impl Wizard<'_> {
         if !checked.holds && checked.not_judged_for.is_empty() {
             let problem = "the device's compensation differs from the PC's by more than rounding";
             let remedy = "update device and program to the same version";
-            return Err(Error::device(name, problem, remedy));
+            return Err(Error::device(name, problem, remedy).into());
         }
         self.tell(Event::Stored {
             unit: name,
             hash: shown,
             words: format!("stored, read back, {kept}; device and PC compute the same"),
         });
-        Ok(Ended::Done)
+        Ok(())
     }
 
     /// Waits until unit `k` reports this calibration in its greeting.
-    async fn wait_for(&mut self, k: usize, hash: u64) -> Result<()> {
+    async fn wait_for(&mut self, k: usize, hash: u64) -> Phased<()> {
         let since = Instant::now();
         loop {
-            let held = self.units[k].station.with(|session| {
-                let stored = session.hello()?.stored.as_ref();
-                Ok(stored.map(|s| s.hash.0))
-            });
+            let held = self.units[k]
+                .station
+                .with(|session| Ok(session.hello()?.stored_hash()));
             match held {
-                Ok(Some(found)) if found == hash => return Ok(()),
+                Ok(Some(found)) if found.0 == hash => return Ok(()),
                 Ok(_) => {
                     let name = self.units[k].name();
                     let problem = "the device lost the calibration when its supply was off";
-                    return Err(Error::device(
-                        name,
-                        problem,
-                        "store it again; if that fails too, its flash is worn out",
-                    ));
+                    let remedy = "store it again; if that fails too, its flash is worn out";
+                    return Err(Error::device(name, problem, remedy).into());
                 }
-                Err(error) if since.elapsed() > BACK => return Err(error),
+                Err(error) if since.elapsed() > BACK => return Err(error.into()),
                 Err(_) => rest(AGAIN).await,
             }
         }

@@ -265,7 +265,7 @@ impl TextBoard {
         let saturated = self.rails.take(&sample.raw).is_some();
         let fits = |c: &Chunk| {
             let same = c.temp_c == sample.temp_c || c.temp_c.is_nan() && sample.temp_c.is_nan();
-            same && c.saturated == saturated && c.tick + c.values.len() as u64 == tick
+            same && c.saturated == saturated && c.end() == tick
         };
         match self.ready.back_mut() {
             Some(SourceEvent::Samples(chunk)) if fits(chunk) => chunk.values.push(sample.raw),

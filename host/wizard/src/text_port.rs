@@ -4,7 +4,6 @@ use std::io::{ErrorKind, Read};
 use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
-use mimu_device::Session;
 use mimu_recording::error::{Error, Result};
 
 use crate::source::{Source, SourceEvent, Unit};
@@ -114,14 +113,6 @@ impl Source for TextSource {
         self.read()?;
         self.board.next(self.now_s())
     }
-
-    fn aside(&mut self) -> Option<&mut Session> {
-        None
-    }
-
-    fn device(&mut self) -> Option<&mut Session> {
-        None
-    }
 }
 
 #[cfg(test)]
@@ -184,7 +175,7 @@ mod tests {
                     samples.extend(numbered.map(|(tick, v)| (tick, v[3] as usize)));
                 }
                 SourceEvent::Restarted(words) | SourceEvent::Note(words) => notes.push(words),
-                SourceEvent::Clock(_) | SourceEvent::Nothing => {}
+                _ => {}
             }
         }
         (samples, notes)

@@ -23,8 +23,8 @@ use crate::event::{Event, UnitState};
 use crate::folder::{Entry, Folder, OpenRecording, Part};
 use crate::procedure::{Fixture, SessionConfig};
 use crate::refit::{Parameter, Progress, calibrate, progress};
-use crate::source::Chunk;
-use crate::station::{Station, StationEvent};
+use crate::source::{Chunk, SourceEvent};
+use crate::station::Station;
 use crate::text::refuse_clock;
 use crate::waiting::{Interruption, Waiting};
 use crate::watch::{LastSecond, Watch, force, guessed};
@@ -145,11 +145,11 @@ pub struct UnitSession {
 }
 
 /// Why the unit has begun anew, if this event says so.
-fn restart(news: &StationEvent) -> Option<String> {
+fn restart(news: &SourceEvent) -> Option<String> {
     match news {
-        StationEvent::Restarted(why) => Some(why.clone()),
+        SourceEvent::Restarted(why) => Some(why.clone()),
         // Most boards have their supply from the same cable, and do not tell of a power-on.
-        StationEvent::Back(unit) if !unit.is_device => Some("the line came back".into()),
+        SourceEvent::Back(unit) if !unit.is_device => Some("the line came back".into()),
         _ => None,
     }
 }
@@ -284,7 +284,7 @@ impl UnitSession {
             some = true;
             self.restarted = restart(&news).or(self.restarted.take());
             match news {
-                StationEvent::Samples(chunk) => {
+                SourceEvent::Samples(chunk) => {
                     self.keep(&chunk);
                     self.count_turns(&chunk);
                     self.tell_turns(tell);
@@ -296,7 +296,7 @@ impl UnitSession {
                         }
                     }
                 }
-                StationEvent::Restarted(why) => {
+                SourceEvent::Restarted(why) => {
                     self.interrupted(Interruption::Restarted(why), tell)?;
                     if let Some(banks) = &mut self.banks {
                         banks.mark_incomplete(
@@ -304,12 +304,13 @@ impl UnitSession {
                         );
                     }
                 }
-                StationEvent::Note(words) => tell.push(Event::Note {
+                SourceEvent::Note(words) => tell.push(Event::Note {
                     words: format!("{}: {words}", self.name()),
                 }),
-                StationEvent::Clock(rate) => self.compare_clock(rate, tell)?,
-                StationEvent::Lost(why) => self.interrupted(Interruption::Lost(why), tell)?,
-                StationEvent::Other(why) => {
+                SourceEvent::Clock(rate) => self.compare_clock(rate, tell)?,
+                SourceEvent::Nothing => {}
+                SourceEvent::Lost(why) => self.interrupted(Interruption::Lost(why), tell)?,
+                SourceEvent::Other(why) => {
                     let why = Interruption::OtherUnit(why);
                     self.state.waiting = Some(Waiting::Interrupted(why.clone()));
                     tell.push(Event::Interrupted {
@@ -317,7 +318,7 @@ impl UnitSession {
                         why,
                     });
                 }
-                StationEvent::Back(unit) => {
+                SourceEvent::Back(unit) => {
                     let nameless = !unit.is_device;
                     self.lost_at = nameless.then_some(self.levels.len()).or(self.lost_at);
                     self.interrupted(Interruption::Back, tell)?;
@@ -366,7 +367,7 @@ impl UnitSession {
 
     fn keep(&mut self, chunk: &Chunk) {
         let missing = chunk.tick.saturating_sub(self.next.unwrap_or(chunk.tick));
-        self.next = Some(chunk.tick + chunk.values.len() as u64);
+        self.next = Some(chunk.end());
         self.power_on_s = chunk.power_on_s;
         self.state.lost += missing;
         let rate_hz = self.station.unit.rate_hz;

@@ -172,7 +172,7 @@ impl Watch {
     /// Adds samples. Returns the statistics of the last second, if it is complete.
     pub fn take(&mut self, chunk: &Chunk) -> Option<LastSecond> {
         let missing = chunk.tick.saturating_sub(self.next.unwrap_or(chunk.tick));
-        self.next = Some(chunk.tick + chunk.values.len() as u64);
+        self.next = Some(chunk.end());
         // After a gap of more than a tenth of a second, a new second begins.
         if missing as f64 > self.block_rows {
             (self.open, self.window) = (Block::default(), VecDeque::new());

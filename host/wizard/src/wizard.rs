@@ -24,14 +24,23 @@ const SILENT: Duration = Duration::from_secs(30);
 /// Longest time in a wrong pose if no person turns the unit: nobody corrects the pose.
 const WRONG: Duration = Duration::from_secs(10);
 
-/// How a phase ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Ended {
-    /// As planned.
-    Done,
+/// Why a phase ended early.
+#[derive(Debug)]
+pub enum Stop {
     /// Cancelled by the user; the session can be resumed later.
     Cancelled,
+    /// It failed.
+    Failed(Error),
 }
+
+impl From<Error> for Stop {
+    fn from(error: Error) -> Self {
+        Self::Failed(error)
+    }
+}
+
+/// Result of what the user can cancel.
+pub type Phased<T> = std::result::Result<T, Stop>;
 
 /// A session.
 pub struct Wizard<'a> {
@@ -59,7 +68,6 @@ pub struct Wizard<'a> {
 /// How a dwell ended.
 enum Stepped {
     Done,
-    Cancelled,
     Skipped,
     Redo(Step),
 }
@@ -99,8 +107,8 @@ impl<'a> Wizard<'a> {
         self.tell(Event::Phase { phase, words });
     }
 
-    /// Processes the events of all units once, and shows the state. Returns the user's request, if any.
-    async fn round(&mut self, step: Option<&Step>, busy: bool) -> Result<Option<UserRequest>> {
+    /// Processes the events of all units once, and shows the state. Returns the user's request, if any; one to cancel ends the phase.
+    async fn round(&mut self, step: Option<&Step>, busy: bool) -> Phased<Option<UserRequest>> {
         let mut tell = Vec::new();
         let round = Round {
             config: &self.config,
@@ -133,6 +141,9 @@ impl<'a> Wizard<'a> {
             self.view.show(&state);
         }
         let request = self.view.request();
+        if request == Some(UserRequest::Cancel) {
+            return Err(Stop::Cancelled);
+        }
         if !some && request.is_none() {
             pause().await;
         }
@@ -147,23 +158,19 @@ impl<'a> Wizard<'a> {
     }
 
     /// Waits until all units send samples and, if requested, have warmed up.
-    pub async fn warm_up(&mut self) -> Result<Ended> {
+    pub async fn warm_up(&mut self) -> Phased<()> {
         let mut since = Instant::now();
         self.current = None;
         // A session that was killed may have left the table turning.
         self.driver.stop()?;
         while self.driver.busy()? {
-            if self.round(None, true).await? == Some(UserRequest::Cancel) {
-                return Ok(Ended::Cancelled);
-            }
+            self.round(None, true).await?;
         }
         for unit in &mut self.units {
             unit.was_turning();
         }
         loop {
-            if self.round(None, false).await? == Some(UserRequest::Cancel) {
-                return Ok(Ended::Cancelled);
-            }
+            self.round(None, false).await?;
             let heard = self.units.iter().all(UnitSession::is_heard);
             if !heard {
                 if since.elapsed() > SILENT {
@@ -176,12 +183,12 @@ impl<'a> Wizard<'a> {
                         ),
                         false => ("no samples arrive", "reset the board and run it again"),
                     };
-                    return Err(Error::device(name, problem, remedy));
+                    return Err(Error::device(name, problem, remedy).into());
                 }
                 continue;
             }
             let Some(limit) = self.config.warm_c_per_min else {
-                return Ok(Ended::Done);
+                return Ok(());
             };
             let warm = |u: &UnitSession| u.trend().is_some_and(|t| t.abs() <= limit);
             for unit in &mut self.units {
@@ -193,14 +200,14 @@ impl<'a> Wizard<'a> {
                 unit.state.waiting = waiting;
             }
             if self.units.iter().all(warm) {
-                return Ok(Ended::Done);
+                return Ok(());
             }
             since = Instant::now();
         }
     }
 
     /// Records the dwells of a part: the planned ones that are missing and, for a calibration by targets, more or fewer.
-    pub async fn dwells(&mut self, part: Part, steps: &[Step]) -> Result<Ended> {
+    pub async fn dwells(&mut self, part: Part, steps: &[Step]) -> Phased<()> {
         for unit in &mut self.units {
             let config = self.config.clone();
             unit.begin(part, &config)?;
@@ -214,7 +221,7 @@ impl<'a> Wizard<'a> {
             let Some(step) = self.choose(part) else {
                 self.driver.stop()?;
                 self.current = None;
-                return Ok(Ended::Done);
+                return Ok(());
             };
             self.current = Some(step);
             let done = self
@@ -231,15 +238,9 @@ impl<'a> Wizard<'a> {
             });
             match self.step(&step).await? {
                 Stepped::Done if self.driver.is_person() => {
-                    if self.goes_on(part, steps, &step).await? == Ended::Cancelled {
-                        return Ok(Ended::Cancelled);
-                    }
+                    self.goes_on(part, steps, &step).await?;
                 }
                 Stepped::Done => {}
-                Stepped::Cancelled => {
-                    self.driver.stop()?;
-                    return Ok(Ended::Cancelled);
-                }
                 Stepped::Skipped => self.queue.push(step),
                 Stepped::Redo(other) => {
                     self.queue.insert(0, step);
@@ -251,14 +252,14 @@ impl<'a> Wizard<'a> {
 
     /// Updates the remaining dwells if the user may have recorded another pose than `step`: the recorded one is done, and `step` follows later. If
     /// all poses differ in the same way, the session ends, unless the user confirms them.
-    async fn goes_on(&mut self, part: Part, steps: &[Step], step: &Step) -> Result<Ended> {
+    async fn goes_on(&mut self, part: Part, steps: &[Step], step: &Step) -> Phased<()> {
         self.queue = self.left(part, steps);
         self.queue.sort_by_key(|s| self.later.contains(s));
         let limit = self.config.fixture.tolerance_deg();
         let last = self.units.first().and_then(|u| u.folder.dwells(part).pop());
         let other = last.filter(|(_, had)| had.up().angle(&step.up()).to_degrees() > limit);
         let Some((_, had)) = other else {
-            return Ok(Ended::Done);
+            return Ok(());
         };
         self.later.push(*step);
         self.queue.sort_by_key(|s| self.later.contains(s));
@@ -273,15 +274,12 @@ impl<'a> Wizard<'a> {
             .iter()
             .find_map(|u| Some((u.name(), u.mirrored(&self.config)?)));
         let Some((name, why)) = mirrored.filter(|_| !self.axes_agreed) else {
-            return Ok(Ended::Done);
+            return Ok(());
         };
-        match self.ask(&Question::GoOn(format!("{name}: {why}"))).await? {
-            Some(true) => {
-                self.axes_agreed = true;
-                Ok(Ended::Done)
-            }
-            Some(false) => Err(Error::device(name, why, axes::REMEDY)),
-            None => Ok(Ended::Cancelled),
+        self.axes_agreed = self.ask(&Question::GoOn(format!("{name}: {why}"))).await?;
+        match self.axes_agreed {
+            true => Ok(()),
+            false => Err(Error::device(name, why, axes::REMEDY).into()),
         }
     }
 
@@ -339,7 +337,7 @@ impl<'a> Wizard<'a> {
         (!self.queue.is_empty()).then(|| self.queue.remove(at))
     }
 
-    async fn step(&mut self, step: &Step) -> Result<Stepped> {
+    async fn step(&mut self, step: &Step) -> Phased<Stepped> {
         for unit in &mut self.units {
             unit.asked_for();
         }
@@ -350,15 +348,10 @@ impl<'a> Wizard<'a> {
                 self.tell(Event::Note { words: why.clone() });
                 told = true;
             }
-            if self.round(None, false).await? == Some(UserRequest::Cancel) {
-                return Ok(Stepped::Cancelled);
-            }
+            self.round(None, false).await?;
             if since.elapsed() > SILENT && !self.driver.is_person() {
-                return Err(Error::device(
-                    "table",
-                    why,
-                    "close that program and run the same command",
-                ));
+                let remedy = "close that program and run the same command";
+                return Err(Error::device("table", why, remedy).into());
             }
         }
         self.driver.go(step)?;
@@ -367,7 +360,6 @@ impl<'a> Wizard<'a> {
         loop {
             let busy = self.driver.busy()?;
             match self.round(Some(step), busy).await? {
-                Some(UserRequest::Cancel) => return Ok(Stepped::Cancelled),
                 Some(UserRequest::Skip) => return Ok(Stepped::Skipped),
                 Some(UserRequest::RedoLast) => {
                     let last = self.units.iter().filter_map(UnitSession::last_number).max();
@@ -380,7 +372,7 @@ impl<'a> Wizard<'a> {
                         return Ok(Stepped::Redo(step));
                     }
                 }
-                None => {}
+                Some(UserRequest::Cancel) | None => {}
             }
             if self.units.iter().all(|u| u.done) {
                 return Ok(Stepped::Done);
@@ -409,7 +401,7 @@ impl<'a> Wizard<'a> {
                     }
                     false => "correct this and run the same command: the session resumes",
                 };
-                return Err(Error::device("session", problem, remedy));
+                return Err(Error::device("session", problem, remedy).into());
             }
         }
     }
@@ -425,19 +417,17 @@ impl<'a> Wizard<'a> {
         Ok(step)
     }
 
-    /// Asks a question, and processes the units' events meanwhile. `None`: the session was cancelled.
-    pub async fn ask(&mut self, question: &Question) -> Result<Option<bool>> {
+    /// Asks a question, and processes the units' events meanwhile.
+    pub async fn ask(&mut self, question: &Question) -> Phased<bool> {
         self.tell(Event::Question {
             question: question.name(),
             words: question.words(),
         });
         loop {
             if let Some(answer) = self.view.ask(question) {
-                return Ok(Some(answer));
+                return Ok(answer);
             }
-            if self.round(None, false).await? == Some(UserRequest::Cancel) {
-                return Ok(None);
-            }
+            self.round(None, false).await?;
         }
     }
 

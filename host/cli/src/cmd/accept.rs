@@ -22,11 +22,9 @@ use mimu_station::limits::Limits;
 use mimu_station::population::Population;
 use mimu_station::quantities::{Quantities, measure};
 use mimu_station::scale::{Ranges, Scale};
-use mimu_station::side::direction;
 
-use crate::arguments::{JsonArgs, VerboseArgs};
-use crate::cmd::design::number;
-use crate::cmd::device::duration;
+use crate::arguments::{JsonArgs, VerboseArgs, number};
+use crate::cmd::device::{duration, side};
 use crate::cmd::wizard::TextArgs;
 use crate::output::{check_outputs, now, print, show};
 use crate::reading::LogArgs;
@@ -63,7 +61,7 @@ pub(crate) struct AcceptArgs {
     #[arg(long, value_name = "G,DEG/S", allow_hyphen_values = true, value_parser = ranges)]
     range: Option<Ranges>,
     /// Side that has to be up: +x, -x, +y, -y, +z, -z; the limits of `tilt` are about it
-    #[arg(long, value_name = "SIDE", allow_hyphen_values = true, value_parser = side)]
+    #[arg(long, value_name = "SIDE", allow_hyphen_values = true, value_parser = |t: &str| side(t).map(|_| t.to_owned()))]
     up: Option<String>,
     /// Which values pass [default: that of the limits, or guarded]
     #[arg(long, value_enum)]
@@ -118,13 +116,6 @@ fn ranges(text: &str) -> std::result::Result<Ranges, String> {
         accel_g: positive(g)?,
         gyro_dps: positive(dps)?,
     })
-}
-
-fn side(text: &str) -> std::result::Result<String, String> {
-    match direction(text) {
-        Some(_) => Ok(text.to_owned()),
-        None => Err("write +x, -x, +y, -y, +z or -z".into()),
-    }
 }
 
 /// No unit passes through a calibration that is judged a misfit; with one whose errors are unexplained or suspect, a warning says so.

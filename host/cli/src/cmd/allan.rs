@@ -10,12 +10,11 @@ use mimu::result::allan::AllanResult;
 use mimu::survey::{Options, Part, survey_all};
 use mimu_allan::Deviation;
 use mimu_recording::error::{Error, Result};
-use mimu_recording::result_file::stage;
 use mimu_recording::{MANIFEST_FILE, Recording};
 
-use crate::arguments::{JsonArgs, StrictArgs, VerboseArgs};
+use crate::arguments::{JsonArgs, StrictArgs, VerboseArgs, number};
 use crate::hint::OF_A_LOG;
-use crate::output::{check_outputs, now, print, progress};
+use crate::output::{Results, check_outputs, now, progress};
 use crate::reading::{LogArgs, open};
 use crate::status::Status;
 
@@ -26,10 +25,10 @@ pub struct AllanArgs {
     #[arg(required = true, value_name = "RECORDING")]
     recordings: Vec<PathBuf>,
     /// First time stamp, s
-    #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = time)]
+    #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = |t: &str| number(t, -1e12, 1e12))]
     from: Option<f64>,
     /// Last time stamp, s
-    #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = time)]
+    #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = |t: &str| number(t, -1e12, 1e12))]
     to: Option<f64>,
     /// Number of a dwell in the column step
     #[arg(long, value_name = "N", conflicts_with_all = ["from", "to"], allow_negative_numbers = true, value_parser = clap::value_parser!(i32).range(0..))]
@@ -41,7 +40,7 @@ pub struct AllanArgs {
     #[arg(long, value_name = "K", default_value_t = 10, value_parser = clap::value_parser!(u16).range(1..=100))]
     per_decade: u16,
     /// Probability of the intervals
-    #[arg(long, value_name = "P", default_value_t = 0.95, value_parser = confidence)]
+    #[arg(long, value_name = "P", default_value_t = 0.95, value_parser = |t: &str| number(t, 0.5, 0.999))]
     confidence: f64,
     /// Calibration of the unit: readings in V or counts are divided by its scale factors, which are stored in the noise file
     #[arg(long, value_name = "FILE")]
@@ -72,20 +71,6 @@ enum KindArg {
     Modified,
     /// Overlapping Hadamard, insensitive to drift
     Hadamard,
-}
-
-fn time(text: &str) -> std::result::Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(t) if t.is_finite() => Ok(t),
-        _ => Err("write a time in seconds".into()),
-    }
-}
-
-fn confidence(text: &str) -> std::result::Result<f64, String> {
-    match text.parse() {
-        Ok(p) if (0.5..=0.999).contains(&p) => Ok(p),
-        _ => Err("write a probability from 0.5 to 0.999".into()),
-    }
 }
 
 impl AllanArgs {
@@ -174,20 +159,15 @@ pub fn run(args: &AllanArgs) -> Result<Status> {
     bar.finish();
     let surveys = surveys?;
     let result = AllanResult::of(&surveys);
-    let mut text = report::allan_text(&result, args.verbose.verbose);
+    let mut out = Results::new(report::allan_text(&result, args.verbose.verbose));
     if !args.verbose.verbose {
-        text.push_str(&next(args));
+        out.say(&next(args));
     }
-    let mut staged = Vec::new();
-    if let (Some(path), Some(noise)) = (&args.output, result.noise_file(&now())) {
-        staged.push(stage(path, noise.to_toml())?);
-        text.push_str(&format!("\nnoise: {}\n", path.display()));
+    if let Some(noise) = result.noise_file(&now()) {
+        out.file("noise", args.output.as_ref(), || Ok(noise.to_toml()))?;
     }
-    if let Some(path) = &args.plot {
-        staged.push(stage(path, plot::svg(&result))?);
-        text.push_str(&format!("\nplot: {}\n", path.display()));
-    }
-    print(&args.json, &text, &result, staged)?;
+    out.file("plot", args.plot.as_ref(), || Ok(plot::svg(&result)))?;
+    out.print(&args.json, &result)?;
     let judgement = result.judgement.as_ref();
     Ok(judgement.map_or(Status::Done, |judgement| args.strict.status(judgement)))
 }

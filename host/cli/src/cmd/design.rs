@@ -16,12 +16,11 @@ use mimu::result::design::{Conditions, Design};
 use mimu::result::next_experiment::NextExperiment;
 use mimu_recording::Reference;
 use mimu_recording::error::{Error, Result};
-use mimu_recording::result_file::stage;
 use nalgebra::Vector3;
 use serde::Serialize;
 
-use crate::arguments::{JsonArgs, SensorArg, VerboseArgs};
-use crate::output::{check_outputs, print};
+use crate::arguments::{JsonArgs, SensorArg, VerboseArgs, number};
+use crate::output::{Results, check_outputs};
 use crate::report;
 use noise::NoiseArg;
 
@@ -126,13 +125,6 @@ fn dwells(text: &str) -> std::result::Result<u16, String> {
     match text.parse() {
         Ok(n) if (1..=200).contains(&n) => Ok(n),
         _ => Err("write a whole number, 1 to 200".into()),
-    }
-}
-
-pub fn number(text: &str, lowest: f64, highest: f64) -> std::result::Result<f64, String> {
-    match text.parse() {
-        Ok(v) if (lowest..=highest).contains(&v) => Ok(v),
-        _ => Err(format!("write a number from {lowest:?} to {highest:?}")),
     }
 }
 
@@ -302,11 +294,7 @@ pub fn run(args: &DesignArgs) -> Result<()> {
         .collect();
     check_outputs(&[args.output.as_deref(), args.json.file()], &stated)?;
     let (made, plan) = args.made()?;
-    let mut text = made.text(args.verbose.verbose);
-    let mut staged = None;
-    if let Some(path) = &args.output {
-        staged = Some(stage(path, plan)?);
-        text.push_str(&format!("\nplan: {}\n", path.display()));
-    }
-    print(&args.json, &text, &made, staged)
+    let mut out = Results::new(made.text(args.verbose.verbose));
+    out.file("plan", args.output.as_ref(), || Ok(plan))?;
+    out.print(&args.json, &made)
 }

@@ -12,9 +12,13 @@ use std::time::Duration;
 use crate::report;
 use clap::{Args, Subcommand, ValueEnum};
 use mimu_core::wire::Request;
-use mimu_device::{Answer, Counted, DeviceResult, Session, Stream, Verdict, self_test, stream};
+use mimu_device::{
+    Answer, Counted, DeviceResult, Session, Stream, Verdict, look, self_test, stream,
+};
 use mimu_recording::RAW_COLUMNS;
 use mimu_recording::error::{Error, Result};
+use mimu_station::side::direction;
+use nalgebra::Vector3;
 use signal_hook::consts::TERM_SIGNALS;
 
 use crate::arguments::JsonArgs;
@@ -96,6 +100,11 @@ struct CountersArgs {
     json: JsonArgs,
 }
 
+/// Direction of the axis that points up, in the body frame.
+pub fn side(text: &str) -> std::result::Result<Vector3<f64>, String> {
+    direction(text).ok_or_else(|| "write the axis that points up: +x, -x, +y, -y, +z or -z".into())
+}
+
 /// `500ms`, `10s`, `2min`, `1h`; a number alone is in seconds.
 pub fn duration(text: &str) -> std::result::Result<Duration, String> {
     let unit = text.trim_start_matches(|c: char| c.is_ascii_digit() || c == '.');
@@ -125,7 +134,8 @@ pub fn interruption() -> Result<Arc<AtomicBool>> {
     Ok(flag)
 }
 
-fn open(port: &PortArgs) -> Result<Session> {
+/// Opens a device, and prints the warnings of its greeting.
+pub fn open(port: &PortArgs) -> Result<Session> {
     let session = Session::open(port.path.as_deref())?;
     for warning in &session.who().warnings {
         eprintln!("warning: {warning}");
@@ -156,13 +166,7 @@ fn info(args: &PlainArgs) -> Result<()> {
     let mut session = Session::open(args.port.path.as_deref())?;
     let mut who = session.who().clone();
     // What the samples are flagged with is in no greeting: a lost front end, a missing reference.
-    let flagged = stream(
-        &mut session,
-        Stream::Raw,
-        Some(FLAGS_SHOWN),
-        || false,
-        |_, _, _| Ok(()),
-    );
+    let flagged = look(&mut session, FLAGS_SHOWN);
     who.warnings
         .extend(flagged.map_or(Vec::new(), |found| found.flagged.warnings()));
     let result = DeviceResult::new("info", session.port(), &who);

@@ -13,14 +13,13 @@ use mimu::prepared::Prepared;
 use mimu::recording_problem::OfRecording;
 use mimu::signal::stillness::DwellSearch;
 use mimu_recording::error::Result;
-use mimu_recording::result_file::stage;
 
 use crate::arguments::{
     JsonArgs, KeepArgs, NoiseArgs, StillArgs, StrictArgs, VerboseArgs, WholeTurnArgs, WritingArgs,
     with_noise,
 };
 use crate::hint::OF_A_LOG;
-use crate::output::{now, print, progress};
+use crate::output::{Results, now, progress};
 use crate::reading::{LogArgs, read};
 use crate::report::refused;
 use crate::status::Status;
@@ -133,58 +132,38 @@ pub fn run(args: &DiagnoseArgs, command_line: &str) -> Result<Status> {
         result: found,
         ..
     } = &done;
-    let mut files = Vec::new();
-    let place = diagnosis.before.prepared.place.clone();
-    let refusal = args.writing.refusal(&found.judgement, &place, MISFIT);
-    let output = args.output.as_ref().filter(|_| refusal.is_none());
-    if let Some(path) = output {
-        files.push(stage(path, done.calibration(&now)?.to_toml())?);
-    }
-    let mut said = String::new();
-    if let Some(path) = &args.plan {
-        said = match next_experiment::together(diagnosis, next) {
-            Some((setup, answer)) => {
-                let manifest = &diagnosis.before.prepared.manifest;
-                let left_out = report::not_in_plan_text(found);
-                let about: String = left_out.lines().map(|l| format!("# {l}\n")).collect();
-                let text = about + &answer.plan(&setup, Some(&manifest.device), manifest.sample_rate_hz);
-                files.push(stage(path, text)?);
-                format!(
-                    "\nplan of the next experiment: {}\n{left_out}",
-                    path.display()
-                )
-            }
-            None => "\nplan of the next experiment: none written, because no plan of this kind would show or distinguish more\n".into(),
-        };
-    }
-    let named: Vec<String> = args
-        .recordings
-        .iter()
-        .map(|r| r.display().to_string())
-        .collect();
-    if let Some(path) = &args.page {
-        let made = Made {
-            recording: named.join(", "),
-            command: command_line.to_owned(),
-            created: now,
-        };
-        files.push(stage(path, report::diagnosis_page(found, &made))?);
-    }
-    for (what, path) in [("calibration", output), ("page", args.page.as_ref())] {
-        if let Some(path) = path {
-            said += &format!("\n{what}: {}\n", path.display());
-        }
-    }
     let detail = report::Detail {
         all: args.verbose.verbose,
         next: args.next,
     };
-    print(
-        &args.json,
-        &(report::diagnosis_text(found, detail) + &said),
-        found,
-        files,
-    )?;
+    let mut out = Results::new(report::diagnosis_text(found, detail));
+    let place = diagnosis.before.prepared.place.clone();
+    let refusal = args.writing.refusal(&found.judgement, &place, MISFIT);
+    let output = args.output.as_ref().filter(|_| refusal.is_none());
+    if args.plan.is_some() {
+        const PLAN: &str = "plan of the next experiment";
+        match next_experiment::together(diagnosis, next) {
+            Some((setup, answer)) => {
+                let manifest = &diagnosis.before.prepared.manifest;
+                let left_out = report::not_in_plan_text(found);
+                let about: String = left_out.lines().map(|l| format!("# {l}\n")).collect();
+                let plan = answer.plan(&setup, Some(&manifest.device), manifest.sample_rate_hz);
+                out.file(PLAN, args.plan.as_ref(), || Ok(about + &plan))?;
+                out.say(&left_out);
+            }
+            None => out.say(&format!(
+                "\n{PLAN}: none written, because no plan of this kind would show or distinguish more\n"
+            )),
+        }
+    }
+    out.file("calibration", output, || {
+        Ok(done.calibration(&now)?.to_toml())
+    })?;
+    out.file("page", args.page.as_ref(), || {
+        let made = Made::of(&args.recordings, command_line);
+        Ok(report::diagnosis_page(found, &made))
+    })?;
+    out.print(&args.json, found)?;
     match refusal {
         Some(error) => Err(error),
         None => Ok(args.strict.status(&found.judgement)),

@@ -18,7 +18,6 @@ use mimu::sessions::class::PartClass;
 use mimu::sessions::{Sessions, fit_determined};
 use mimu::signal::stillness::DwellSearch;
 use mimu_recording::error::{Error, Result};
-use mimu_recording::result_file::stage;
 use mimu_recording::ReferenceError;
 use serde::Serialize;
 
@@ -27,7 +26,7 @@ use crate::arguments::{
     WholeTurnArgs, WritingArgs, with_noise,
 };
 use crate::hint::OF_A_LOG;
-use crate::output::{now, print};
+use crate::output::{Results, now};
 use crate::reading::{LogArgs, read_samples_or_means};
 use crate::report;
 use crate::report::budget::budget_text;
@@ -330,16 +329,14 @@ fn write(
     let sheet = data_sheet(args, &made)?;
     text.extend(sheet.as_ref().map(data_sheet_text));
     let refusal = args.writing.refusal(judgement, place, CHECK);
-    let mut calibration = None;
-    if let Some(path) = args.output.as_ref().filter(|_| refusal.is_none()) {
-        calibration = Some(stage(path, made()?.to_toml())?);
-        text.push_str(&format!("\ncalibration: {}\n", path.display()));
-    }
+    let mut out = Results::new(text);
+    let path = args.output.as_ref().filter(|_| refusal.is_none());
+    out.file("calibration", path, || Ok(made()?.to_toml()))?;
     let both = WithDataSheet {
         result,
         data_sheet: sheet.as_ref(),
     };
-    print(&args.json, &text, &both, calibration)?;
+    out.print(&args.json, &both)?;
     match refusal {
         Some(error) => Err(error),
         None => Ok(args.strict.status(judgement)),

@@ -8,10 +8,9 @@ use mimu_fleet::labels::LabelTable;
 use mimu_fleet::tree::{Search, Tree};
 use mimu_fleet::{Options, fleet, fleet_and_prior};
 use mimu_recording::error::Result;
-use mimu_recording::result_file::stage;
 
 use crate::arguments::{JsonArgs, VerboseArgs};
-use crate::output::{check_outputs, now, print, progress};
+use crate::output::{Results, check_outputs, progress};
 use crate::report::{Made, fleet_page, fleet_text};
 
 #[derive(Args)]
@@ -73,25 +72,11 @@ pub fn run(args: &FleetArgs, command_line: &str) -> Result<()> {
         }
         false => (fleet(tree?, part.as_ref(), &options)?, None),
     };
-    let mut text = fleet_text(&result, args.verbose.verbose);
-    let mut files = Vec::new();
-    if let Some(out) = &args.out {
-        let names: Vec<String> = args
-            .folders
-            .iter()
-            .map(|f| f.display().to_string())
-            .collect();
-        let made = Made {
-            recording: names.join(", "),
-            command: command_line.to_owned(),
-            created: now(),
-        };
-        files.push(stage(out, fleet_page(&result, &made))?);
-        text += &format!("page: {}\n", out.display());
+    let mut out = Results::new(fleet_text(&result, args.verbose.verbose));
+    let made = Made::of(&args.folders, command_line);
+    out.file("page", args.out.as_ref(), || Ok(fleet_page(&result, &made)))?;
+    if let Some(prior) = prior {
+        out.file("prior", args.prior.as_ref(), || Ok(prior.to_toml()))?;
     }
-    if let Some((path, prior)) = args.prior.as_ref().zip(prior) {
-        files.push(stage(path, prior.to_toml())?);
-        text += &format!("prior: {}\n", path.display());
-    }
-    print(&args.json, &text, &result, files)
+    out.print(&args.json, &result)
 }

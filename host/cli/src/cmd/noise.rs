@@ -10,12 +10,11 @@ use mimu::prepared::Prepared;
 use mimu_export::worst_axis::{NoiseOptions, WalkOptions};
 use mimu_export::{Format, Sources, driver, kalibr};
 use mimu_recording::error::Result;
-use mimu_recording::result_file::stage;
 use mimu_recording::{MANIFEST_FILE, Recording};
 
 use crate::arguments::{JsonArgs, StillArgs, StrictArgs};
 use crate::hint::OF_A_LOG;
-use crate::output::{check_outputs, print, progress};
+use crate::output::{Results, check_outputs, progress};
 use crate::reading::{LogArgs, open};
 use crate::report;
 use crate::status::Status;
@@ -78,17 +77,15 @@ pub(crate) fn run(args: &NoiseInUseArgs) -> Result<Status> {
     let result = args.found(&recording, &calibration, &noise, &|share| bar.reach(share));
     bar.finish();
     let result = result?;
-    let mut text = report::noise_in_use_text(&result);
-    let mut staged = Vec::new();
-    if let Some(path) = &args.output {
-        let content = match path.extension().is_some_and(|e| e == "toml") {
-            true => result.noise_file.to_toml().into_bytes(),
-            false => kalibr_file(&result.noise_file)?,
-        };
-        staged.push(stage(path, content)?);
-        text.push_str(&format!("noise: {}\n", path.display()));
-    }
-    print(&args.json, &text, &result, staged)?;
+    let mut out = Results::new(report::noise_in_use_text(&result));
+    let is_toml = |path: &PathBuf| path.extension().is_some_and(|e| e == "toml");
+    out.file("noise", args.output.as_ref(), || {
+        match args.output.as_ref().is_some_and(is_toml) {
+            true => Ok(result.noise_file.to_toml().into_bytes()),
+            false => kalibr_file(&result.noise_file),
+        }
+    })?;
+    out.print(&args.json, &result)?;
     Ok(args.strict.status(&result.judgement))
 }
 

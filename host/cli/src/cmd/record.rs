@@ -10,17 +10,13 @@ use crate::report;
 use clap::Args;
 use indicatif::ProgressBar;
 use mimu::plan::Plan;
-use mimu_device::Session;
 use mimu_device::record::{Known, RecordOptions, RecordingState, Steps, UserRequest, record};
 use mimu_recording::error::{Error, Result};
-use mimu_recording::units::STANDARD_GRAVITY;
 use mimu_recording::{Inputs, SampleFormat};
 
-use crate::arguments::JsonArgs;
-use crate::cmd::device::{PortArgs, duration, interruption};
+use crate::arguments::{JsonArgs, assumed_gravity, known_gravity, warned};
+use crate::cmd::device::{PortArgs, duration, interruption, open};
 use crate::output::{check_outputs, print, progress};
-use mimu::quantity::normal_gravity;
-use mimu::warning::Warning;
 
 /// Options common to all recordings of a device, whoever moves the unit.
 #[derive(Args)]
@@ -60,22 +56,8 @@ impl RecordingArgs {
             None => plan.and_then(|plan| plan.gravity_mps2),
             Some(_) => None,
         };
-        match (self.gravity.or(of_plan), self.latitude_deg(plan)) {
-            (Some(gravity), latitude) => {
-                let warning = latitude.and_then(|at| Warning::of_gravity(gravity, at));
-                if let Some(warning) = warning {
-                    eprintln!("warning: {warning}");
-                }
-                gravity
-            }
-            (None, Some(latitude)) => normal_gravity(latitude),
-            (None, None) => {
-                eprintln!(
-                    "warning: gravity is assumed to be 9.80665 m/s². It ranges from 9.78 to 9.83, and every scale factor of the accelerometer errs by the same ratio: give --gravity or --latitude"
-                );
-                STANDARD_GRAVITY
-            }
-        }
+        let known = known_gravity(self.gravity.or(of_plan), self.latitude_deg(plan));
+        warned(known.unwrap_or_else(assumed_gravity))
     }
 }
 
@@ -184,10 +166,7 @@ pub fn run(args: &RecordArgs) -> Result<()> {
         format: args.of.format,
     };
     let titles = known.as_ref().map(titles).unwrap_or_default();
-    let mut session = Session::open(args.port.path.as_deref())?;
-    for warning in &session.who().warnings {
-        eprintln!("warning: {warning}");
-    }
+    let mut session = open(&args.port)?;
     let stop = interruption()?;
     let marks = args.steps.then(keyboard).transpose()?;
     let spinner = ProgressBar::new_spinner();

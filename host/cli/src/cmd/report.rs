@@ -160,12 +160,7 @@ pub fn run(args: &ReportArgs, command_line: &str) -> Result<()> {
         noise: noise.as_ref(),
         data_sheet: sheet.as_ref(),
     };
-    let names: Vec<&str> = recordings.iter().map(|r| r.0.as_str()).collect();
-    let made = Made {
-        recording: names.join(", "),
-        command: command_line.to_owned(),
-        created: now,
-    };
+    let made = Made::of(&inputs.recordings, command_line);
     stage(&args.out, unit_page(&unit, &made))?.publish()?;
     let verdict = verdict(&unit);
     show(&format!("{verdict}page: {}\n", args.out.display()))

@@ -10,17 +10,17 @@ use clap::{Args, Subcommand};
 use mimu::calibration::Calibration;
 use mimu::signal::stillness::{DwellSearch, Steps};
 use mimu_recording::error::Result;
-use mimu_recording::result_file::stage;
 use mimu_thermal::base;
 use mimu_thermal::fit::{Options, fit};
 use mimu_thermal::result::ThermalResult;
 use mimu_thermal::session::Session;
 
 use crate::arguments::{
-    JsonArgs, NoiseArgs, StillArgs, StrictArgs, VerboseArgs, WritingArgs, with_noise,
+    JsonArgs, NoiseArgs, StillArgs, StrictArgs, VerboseArgs, WritingArgs, number, range_c,
+    with_noise,
 };
 use crate::hint::OF_A_LOG;
-use crate::output::{now, print};
+use crate::output::{Results, check_outputs, now, print};
 use crate::reading::{LogArgs, read};
 use crate::report::{self, Made, thermal_plot};
 use crate::status::Status;
@@ -51,11 +51,11 @@ pub struct FitArgs {
     /// Recording for judging only: a sweep at another rate, or a soak
     #[arg(long, value_name = "REC")]
     verify: Vec<PathBuf>,
-    /// Lag of the dies if it is known; 0: no lag
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = lag)]
+    /// Lag of the dies if it is known; 0: no lag, below 0: the dies lead
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = |t: &str| number(t, -120.0, 600.0))]
     lag: Option<f64>,
     /// Temperatures of the dies that the curves have to cover; otherwise nothing is written
-    #[arg(long, value_name = "FROM..TO", allow_hyphen_values = true, value_parser = range)]
+    #[arg(long, value_name = "FROM..TO", allow_hyphen_values = true, value_parser = range_c)]
     range: Option<[f64; 2]>,
     /// Calibration of the unit at one temperature; recordings at rest add the biases over temperature to it. Without it they give a file of biases
     /// for `mimu export px4` and `ardupilot`
@@ -116,22 +116,6 @@ const BIASES: &str =
 const MISFIT: &str =
     "look for jumps and moves in the plot and leave those parts out, or write it all the same";
 
-fn lag(text: &str) -> std::result::Result<f64, String> {
-    match text.parse() {
-        Ok(s) if (-120.0..=600.0).contains(&s) => Ok(s),
-        _ => Err("write seconds from -120 (the dies lead) to 600".into()),
-    }
-}
-
-fn range(text: &str) -> std::result::Result<[f64; 2], String> {
-    let ends = text.split_once("..");
-    let numbers = ends.and_then(|(a, b)| Some([a.parse().ok()?, b.parse().ok()?]));
-    match numbers {
-        Some([from, to]) if from < to => Ok([from, to]),
-        _ => Err("write FROM..TO in degrees Celsius, as in -20..60".into()),
-    }
-}
-
 pub(crate) fn run(args: &ThermalArgs, command_line: &str) -> Result<Status> {
     let done = |()| Status::Done;
     match &args.command {
@@ -163,38 +147,30 @@ fn run_fit(args: &FitArgs, command_line: &str) -> Result<Status> {
     args.writing.check(args.output.as_deref())?;
     let fitted = fit(sessions, &verify, args.options())?;
     let result = ThermalResult::of(&fitted);
-    let mut text = report::thermal_text(&result, args.verbose.verbose);
-    let mut staged = Vec::new();
+    let mut out = Results::new(report::thermal_text(&result, args.verbose.verbose));
     let now = now();
     let place = fitted.sessions[0].place.clone();
     let refusal = args.writing.refusal(&result.judgement, &place, MISFIT);
-    if let Some(path) = args.output.as_ref().filter(|_| refusal.is_none()) {
-        let (what, made) = match &base {
-            None if fitted.is_biases_only() => (BIASES, fitted.biases(&now)?.to_toml()),
-            None => ("calibration", fitted.calibration(&now)?.to_toml()),
-            Some(base) => {
-                let made = base::calibration(&fitted, base, &now)?;
-                ("calibration", made.to_toml())
-            }
-        };
-        staged.push(stage(path, made)?);
-        text.push_str(&format!("{what}: {}\n", path.display()));
+    let path = args.output.as_ref().filter(|_| refusal.is_none());
+    match &base {
+        None if fitted.is_biases_only() => {
+            out.file(BIASES, path, || Ok(fitted.biases(&now)?.to_toml()))?;
+        }
+        None => out.file("calibration", path, || {
+            Ok(fitted.calibration(&now)?.to_toml())
+        })?,
+        Some(base) => out.file("calibration", path, || {
+            Ok(base::calibration(&fitted, base, &now)?.to_toml())
+        })?,
     }
-    if let Some(path) = &args.plot {
-        staged.push(stage(path, thermal_plot::svg(&result))?);
-        text.push_str(&format!("\nplot: {}\n", path.display()));
-    }
-    if let Some(path) = &args.page {
-        let named = args.recordings.iter().map(|r| r.display().to_string());
-        let made = Made {
-            recording: named.collect::<Vec<_>>().join(", "),
-            command: command_line.to_owned(),
-            created: now,
-        };
-        staged.push(stage(path, report::thermal_page(&result, &made))?);
-        text.push_str(&format!("\npage: {}\n", path.display()));
-    }
-    print(&args.json, &text, &result, staged)?;
+    out.file("plot", args.plot.as_ref(), || {
+        Ok(thermal_plot::svg(&result))
+    })?;
+    out.file("page", args.page.as_ref(), || {
+        let made = Made::of(&args.recordings, command_line);
+        Ok(report::thermal_page(&result, &made))
+    })?;
+    out.print(&args.json, &result)?;
     match refusal {
         Some(error) => Err(error),
         None => Ok(args.strict.status(&result.judgement)),

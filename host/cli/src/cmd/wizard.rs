@@ -12,7 +12,6 @@ use mimu::prior::Prior;
 use mimu::quantity::normal_gravity;
 use mimu::readable::STANDARD_GRAVITY;
 use mimu::result::diagnosis::DiagnosisResult;
-use mimu::warning::Warning;
 use mimu_equipment::drive::{Person, TextDriver};
 use mimu_equipment::step::Step;
 use mimu_recording::error::{Error, Result};
@@ -24,14 +23,11 @@ use mimu_wizard::session::{Outcome, UnitSpec, run as carry_out};
 use mimu_wizard::text::Text;
 use mimu_wizard::text_line::Columns;
 
-use crate::arguments::targets;
-use crate::arguments::{JsonArgs, degrees, whole_turns};
-use crate::cmd::design::number;
-use crate::output::now;
+use crate::arguments::{JsonArgs, degrees, known_gravity, number, targets, warned, whole_turns};
 use crate::report::{self, Made};
 
 #[cfg(not(target_family = "wasm"))]
-pub(crate) use terminal::run;
+pub(crate) use terminal::{each, run};
 
 /// Alignment of the unit with a table if nothing is stated, degrees, half of a 95 % interval: a bracket with dowel pins.
 const MOUNTING_DEG: f64 = 0.02;
@@ -139,7 +135,7 @@ pub(crate) struct TextArgs {
     #[arg(long, value_name = "N", default_value_t = 115_200, requires = "text")]
     baud: u32,
     /// Unit of its readings: count, V, or SI (rad/s and m/s²)
-    #[arg(long, value_name = "UNIT", default_value = "count", value_parser = raw_unit, requires = "text")]
+    #[arg(long, value_name = "UNIT", default_value = "count", requires = "text")]
     raw_unit: RawUnit,
     /// Name of the unit [default: its port]
     #[arg(long, value_name = "NAME", requires = "text")]
@@ -149,26 +145,11 @@ pub(crate) struct TextArgs {
     trust_clock: bool,
 }
 
-fn raw_unit(text: &str) -> std::result::Result<RawUnit, String> {
-    match text {
-        "count" => Ok(RawUnit::Count),
-        "V" => Ok(RawUnit::Volt),
-        "SI" => Ok(RawUnit::Si),
-        _ => Err("count, V or SI is needed".into()),
-    }
-}
-
 impl TextArgs {
     /// Columns and unit of a board that writes lines, if there is one.
     fn words(&self) -> Option<String> {
         let names = self.text.as_ref()?;
         Some(format!("{names} in {}", self.raw_unit))
-    }
-
-    /// Names of the numbers of a line, if the board writes lines.
-    #[cfg(not(target_family = "wasm"))]
-    pub(crate) fn names(&self) -> Option<&str> {
-        self.text.as_deref()
     }
 
     /// The board at this port; `k` is its index if there are several.
@@ -318,12 +299,8 @@ impl WizardArgs {
                 planned(&plan, fixture, gravity.unwrap_or(STANDARD_GRAVITY), path)?
             }
         };
-        if let (Some(gravity), Some(at)) = (gravity, latitude_deg)
-            && let Some(warning) = Warning::of_gravity(gravity, at)
-        {
-            eprintln!("warning: {warning}");
-        }
-        let Some(gravity_mps2) = gravity else {
+        let known = known_gravity(gravity, latitude_deg);
+        let Some(gravity_mps2) = known.map(warned) else {
             let problem = "local gravity is unknown, and every scale factor of the accelerometer is proportional to it";
             return Err(Error::new(
                 "wizard",
@@ -411,11 +388,7 @@ fn planned(plan: &Plan, fixture: Fixture, gravity_mps2: f64, path: &Path) -> Res
 /// Writes the page of a session's diagnosis, with the command that was typed.
 fn page(command_line: &str) -> impl Fn(&DiagnosisResult, &Path) -> Result<String> {
     |found, folder| {
-        let made = Made {
-            recording: folder.join("calibration").display().to_string(),
-            command: command_line.to_owned(),
-            created: now(),
-        };
+        let made = Made::of(&[folder.join("calibration")], command_line);
         Ok(report::diagnosis_page(found, &made))
     }
 }

@@ -3,6 +3,7 @@
 //! A page is valid XML too, so that any parser can read it. Each number is a `data` element with the value from the JSON.
 
 use std::fmt::Display;
+use std::path::PathBuf;
 
 use maud::{Markup, PreEscaped, html};
 use mimu::judgement::Judgement;
@@ -12,6 +13,7 @@ use mimu::recording_problem::OfRecording;
 
 use super::svg::raised;
 use super::terminal::text;
+use crate::output::now;
 
 /// How much of a result its document has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -54,6 +56,16 @@ pub struct Made {
 }
 
 impl Made {
+    /// A page made now of `recordings` by the command line `command`.
+    pub(crate) fn of(recordings: &[PathBuf], command: &str) -> Self {
+        let named = recordings.iter().map(|r| r.display().to_string());
+        Self {
+            recording: named.collect::<Vec<_>>().join(", "),
+            command: command.to_owned(),
+            created: now(),
+        }
+    }
+
     /// The last line of a page that `tool` has made.
     pub(super) fn line(&self, tool: &str) -> Markup {
         html! { p class="dim" { (tool) ", " (self.created) ": " code { (self.command) } } }

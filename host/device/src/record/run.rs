@@ -2,8 +2,6 @@
 
 use std::time::{Duration, Instant};
 
-use mimu_core::wire::Request;
-
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{Batch, Columns, Growing, Manifest, Restart, SampleFormat};
 
@@ -16,6 +14,7 @@ use crate::identity::Started;
 use crate::reading::shortest;
 use crate::received::{Event, Samples};
 use crate::session::Session;
+use crate::stream::Stream;
 
 /// Silence after which the device is asked to greet and stream again.
 const SILENCE: Duration = Duration::from_secs(2);
@@ -39,12 +38,6 @@ pub(super) struct Run {
     pub line: line::LineTotals,
     pub one_power_on: bool,
 }
-
-/// Request for the raw stream.
-const RAW: Request<'_> = Request::Stream {
-    raw: true,
-    compensated: false,
-};
 
 impl Run {
     /// Creates the recording, to which `manifest` belongs until its end.
@@ -85,7 +78,7 @@ impl Run {
         options: &RecordOptions,
         look: &mut impl FnMut(&RecordingState) -> UserRequest,
     ) -> Result<()> {
-        session.begin_stream(RAW)?;
+        session.begin_stream(Stream::Raw.request())?;
         let wanted = self.steps.end().into_iter().chain(options.duration).min();
         loop {
             match self.hear(session, options.reconnect, wanted) {
@@ -152,7 +145,7 @@ impl Run {
                 }
                 self.starts = who.starts;
                 self.clock.restarted(Some(who.start.clone()));
-                session.done(RAW, "to stream")?;
+                session.done(Stream::Raw.request(), "to stream")?;
             }
             Some(_) => {}
             None if self.heard.elapsed() > SILENCE && self.asked.elapsed() > SILENCE => {
@@ -179,7 +172,7 @@ impl Run {
                     // After a power failure the starts are counted anew.
                     self.clock.reconnected(start);
                 }
-                session.done(RAW, "to stream")?;
+                session.done(Stream::Raw.request(), "to stream")?;
                 self.state.resumed += 1;
                 self.state.waiting = false;
                 Ok(())
@@ -218,7 +211,7 @@ impl Run {
         } else {
             self.clock.reconnected(start);
         }
-        session.begin_stream(RAW)?;
+        session.begin_stream(Stream::Raw.request())?;
         Ok(true)
     }
 
@@ -298,7 +291,7 @@ impl Run {
             first_row: self.growing.rows(),
             ..Batch::default()
         };
-        for (ns, sample) in times_ns.zip(&samples.values[..count]) {
+        for (ns, row) in times_ns.zip(&samples.rows(port)?[..count]) {
             batch.t_s.push(seconds(ns));
             if let Some(step) = self.steps.at(self.since_begun(ns)) {
                 batch.step.push(step);
@@ -314,17 +307,8 @@ impl Run {
                 self.state.dwells = self.state.dwells.max((step + 1) as u32);
             }
             batch.temp_c.push(shortest(samples.head.temp_c));
-            let values = sample.gyro.iter().chain(sample.accel.iter());
-            for (column, value) in batch.raw.iter_mut().zip(values) {
-                if !value.is_finite() {
-                    let problem = "the device sent a reading that is not a number";
-                    return Err(Error::new(
-                        port,
-                        problem,
-                        "reset the board, and report this",
-                    ));
-                }
-                column.push(shortest(*value));
+            for (column, value) in batch.raw.iter_mut().zip(row) {
+                column.push(*value);
             }
         }
         self.clock.passed(head, first_ns, samples.values.len());

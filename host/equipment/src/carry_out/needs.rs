@@ -113,16 +113,13 @@ fn check_table(procedure: &Procedure, place: &str, table: &Abilities) -> Result<
             let problem = format!("{what}, but {} lacks the command", table.place);
             Err(Error::new(&at, problem, remedy))
         };
-        let beyond = |what: &str, value: f64, limit: Option<f64>, key: &str| match limit {
-            Some(limit) if value > limit => {
-                let problem = format!(
-                    "{what} of {value:.1}, and {} has {key} = {limit}",
-                    table.place
-                );
+        let within = |beyond: Option<String>| match beyond {
+            Some(what) => {
+                let problem = format!("{what} of {}", table.place);
                 let remedy = "plan within what the table does, or correct [limits]";
                 Err(Error::new(&at, problem, remedy))
             }
-            _ => Ok(()),
+            None => Ok(()),
         };
         let Some(up) = dwell.up else {
             let problem = "the plan leaves the pose open, but a table needs one";
@@ -130,30 +127,13 @@ fn check_table(procedure: &Procedure, place: &str, table: &Abilities) -> Result<
         };
         let limits = table.limits;
         let tilt = |up: [f64; 3]| up[0].hypot(up[1]).atan2(up[2]).to_degrees();
-        beyond(
-            "a tilt in degrees",
-            tilt(up),
-            limits.middle_deg,
-            "middle_deg",
-        )?;
-        beyond(
-            "a rate in deg/s",
-            dwell.rate_dps.abs(),
-            limits.rate_dps,
-            "rate_dps",
-        )?;
+        within(limits.beyond(dwell.rate_dps, tilt(up), 0.0))?;
         if dwell.rate_dps != 0.0 && !table.rates {
             return lacks("it turns at a rate", "add `rate` to the driver file".into());
         }
         if let Some(turn) = &dwell.turn {
-            beyond(
-                "a turn in deg/s",
-                turn.rate_dps,
-                limits.turn_dps,
-                "turn_dps",
-            )?;
             let middle = tilt(turn.from_up).max(turn.to_deg[0].abs());
-            beyond("a tilt in degrees", middle, limits.middle_deg, "middle_deg")?;
+            within(limits.beyond(0.0, middle, turn.rate_dps))?;
             if !table.turns.contains(&turn.axis) {
                 let name = turn.axis.name();
                 let what = format!("the {name} axis turns by an angle");

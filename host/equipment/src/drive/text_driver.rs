@@ -148,17 +148,9 @@ impl Driver for TextDriver {
 
     fn go(&mut self, step: &Step) -> Result<()> {
         let (middle, _) = angles(&step.up());
-        let limits = self.file.limits;
-        let beyond = |what: &str, value: f64, limit: f64| {
-            let problem = format!("{what} of {value:.1} is beyond the table's {limit}");
+        if let Some(problem) = self.file.limits.beyond(step.rate_dps, middle, 0.0) {
             let remedy = "leave this dwell out, or correct [limits]";
-            Err(Error::new(&self.place, problem, remedy))
-        };
-        if let Some(limit) = limits.rate_dps.filter(|l| step.rate_dps.abs() > *l) {
-            return beyond("a rate in deg/s", step.rate_dps, limit);
-        }
-        if let Some(limit) = limits.middle_deg.filter(|l| middle.abs() > *l) {
-            return beyond("a tilt in degrees", middle, limit);
+            return Err(Error::new(&self.place, problem, remedy));
         }
         self.not_held()?;
         self.stop()?;
@@ -168,11 +160,8 @@ impl Driver for TextDriver {
         if step.rate_dps != 0.0 {
             if self.file.rate.is_none() {
                 let problem = "a dwell turns, but the file has no [rate]";
-                return Err(Error::new(
-                    &self.place,
-                    problem,
-                    "give the command that sets a rate",
-                ));
+                let remedy = "give the command that sets a rate";
+                return Err(Error::new(&self.place, problem, remedy));
             }
             self.then = Some(*step);
         }

@@ -17,7 +17,7 @@ use crate::folder::{Entry, Part};
 use crate::procedure::verification;
 use crate::refit::of_population;
 use crate::verdict::{judge, prepared};
-use crate::wizard::Ended;
+use crate::wizard::Phased;
 use mimu_equipment::step::Step;
 
 /// Calibration with effects from the diagnosis of a unit.
@@ -129,17 +129,15 @@ impl OpenSession<'_> {
         &mut self,
         plain: &[AffineCalibration],
         found: Vec<Option<CalibrationWithEffects>>,
-    ) -> Result<Ended> {
+    ) -> Phased<()> {
         let names: Vec<String> = found
             .iter()
             .flatten()
             .flat_map(|f| f.effects.clone())
             .collect();
         let question = Question::StoreEffects(names.join(", "));
-        match self.wizard.ask(&question).await? {
-            None => return Ok(Ended::Cancelled),
-            Some(false) => return Ok(Ended::Done),
-            Some(true) => {}
+        if !self.wizard.ask(&question).await? {
+            return Ok(());
         }
         let config = &self.wizard.config;
         let used: Vec<Step> = config
@@ -160,7 +158,7 @@ impl OpenSession<'_> {
             names.join(", ")
         );
         self.wizard.begin_phase(Phase::Confirmation, words);
-        or_cancelled!(self.wizard.dwells(Part::Confirmation, &steps).await);
+        self.wizard.dwells(Part::Confirmation, &steps).await?;
         self.finish()?;
         for ((k, found), plain) in (0..).zip(found).zip(plain) {
             let Some(mut found) = found else { continue };
@@ -184,18 +182,14 @@ impl OpenSession<'_> {
                 self.outcomes[k].notes.push(note.into());
                 continue;
             }
-            if let Some(why) = judged.rough() {
-                match self.wizard.ask(&Question::StoreRough(why.clone())).await? {
-                    None => return Ok(Ended::Cancelled),
-                    Some(true) => {}
-                    Some(false) => {
-                        self.outcomes[k].notes.push(format!("not stored: {why}"));
-                        continue;
-                    }
-                }
+            if let Some(why) = judged.rough()
+                && !self.wizard.ask(&Question::StoreRough(why.clone())).await?
+            {
+                self.outcomes[k].notes.push(format!("not stored: {why}"));
+                continue;
             }
-            or_cancelled!(self.store(k, WITH_EFFECTS, &found.calibration).await);
+            self.store(k, WITH_EFFECTS, &found.calibration).await?;
         }
-        Ok(Ended::Done)
+        Ok(())
     }
 }

@@ -1,32 +1,23 @@
 //! The phase of whole turns: each is asked for until it counts.
 
-use mimu_recording::error::Result;
-
-use super::{Ended, Wizard};
+use super::{Phased, Wizard};
 use crate::event::{Event, UserRequest};
 use crate::folder::Part;
 use crate::spin::{Spin, TURNS};
 use crate::unit_session::UnitSession;
 
-/// How a spin ended.
-enum Turned {
-    Done,
-    Cancelled,
-    Skipped,
-}
-
 impl Wizard<'_> {
     /// Asks for the whole turns of a part that are missing, if the session has any.
-    pub async fn whole_turns(&mut self, part: Part) -> Result<Ended> {
+    pub async fn whole_turns(&mut self, part: Part) -> Phased<()> {
         let Some(stated) = self.config.whole_turns else {
-            return Ok(Ended::Done);
+            return Ok(());
         };
         if !self.units.iter().all(UnitSession::can_count) {
             let words = "whole turns are left out: the poses do not determine the gyro, so that its turns cannot be counted";
             self.tell(Event::Note {
                 words: words.into(),
             });
-            return Ok(Ended::Done);
+            return Ok(());
         }
         let all = Spin::all(part, stated.turns.unwrap_or(TURNS));
         let (mut later, mut left_out) = (Vec::new(), Vec::new());
@@ -38,16 +29,16 @@ impl Wizard<'_> {
             let Some(spin) = left.first().copied() else {
                 break;
             };
-            match self.spin(part, spin, all.len() - left.len()).await? {
-                Turned::Done => {}
-                Turned::Cancelled => return Ok(Ended::Cancelled),
-                Turned::Skipped if later.contains(&spin) => left_out.push(spin),
-                Turned::Skipped => later.push(spin),
+            let done = self.spin(part, spin, all.len() - left.len()).await?;
+            match later.contains(&spin) {
+                _ if done => {}
+                true => left_out.push(spin),
+                false => later.push(spin),
             }
         }
         self.units.iter_mut().for_each(UnitSession::end_spins);
         self.current = None;
-        Ok(Ended::Done)
+        Ok(())
     }
 
     /// Those of `all` that a unit lacks.
@@ -57,7 +48,8 @@ impl Wizard<'_> {
         left.max_by_key(Vec::len).unwrap_or_default()
     }
 
-    async fn spin(&mut self, part: Part, spin: Spin, done: usize) -> Result<Turned> {
+    /// Whether a spin was made, and not skipped.
+    async fn spin(&mut self, part: Part, spin: Spin, done: usize) -> Phased<bool> {
         let step = spin.rest(self.config.dwell_s);
         self.current = Some(step);
         self.tell(Event::Spin {
@@ -78,8 +70,7 @@ impl Wizard<'_> {
         }
         while !self.units.iter().all(|u| u.done) {
             match self.round(Some(&step), false).await? {
-                Some(UserRequest::Cancel) => return Ok(Turned::Cancelled),
-                Some(UserRequest::Skip) => return Ok(Turned::Skipped),
+                Some(UserRequest::Skip) => return Ok(false),
                 Some(UserRequest::RedoLast | UserRequest::Redo(_)) => {
                     self.units.iter_mut().for_each(UnitSession::restart_spin);
                     let words = "from the beginning: put it against the edge, and let it rest";
@@ -87,9 +78,9 @@ impl Wizard<'_> {
                         words: words.into(),
                     });
                 }
-                None => {}
+                Some(UserRequest::Cancel) | None => {}
             }
         }
-        Ok(Turned::Done)
+        Ok(true)
     }
 }

@@ -10,11 +10,10 @@ use mimu_recording::units::STANDARD_GRAVITY;
 use mimu_recording::{UNNAMED, are_two_units};
 use mimu_station::boards::Boards;
 use mimu_station::gather::{Samples, Take};
-use mimu_wizard::device::DeviceSource;
-use mimu_wizard::source::{Opener, Source as Line};
-use mimu_wizard::text_port::TextOpener;
+use mimu_wizard::source::Opener;
 
 use super::{AcceptArgs, Source};
+use crate::cmd::wizard::each;
 use crate::output::progress;
 use crate::reading::open;
 
@@ -120,34 +119,13 @@ impl AcceptArgs {
 
     /// The ports with what opens them; without any, the only port at which a device greets.
     fn openers(&self) -> Result<Vec<(String, Opener)>> {
-        let ports: Vec<Option<&String>> = match self.ports.as_slice() {
-            [] => vec![None],
-            ports => ports.iter().map(Some).collect(),
-        };
-        let several = ports.len() > 1;
-        let each = (1..).zip(ports).map(|(k, port)| {
+        let several = self.ports.len() > 1;
+        let openers = (1..).zip(each(&self.ports)).map(|(k, port)| {
             let place = port.cloned().unwrap_or_else(|| "device".into());
-            let opener: Opener = match (self.text.names(), port) {
-                (Some(names), Some(port)) => {
-                    let board = self.text.board(names, port, several.then_some(k))?;
-                    let mut opener = TextOpener::new(board, None);
-                    Box::new(move |next| Ok(Box::new(opener.open(next)?) as Box<dyn Line>))
-                }
-                (Some(_), None) => {
-                    let problem = "a board that writes lines cannot be found by itself";
-                    return Err(Error::new("--text", problem, "name its port with --port"));
-                }
-                (None, port) => {
-                    let port = port.cloned();
-                    Box::new(move |next| {
-                        let source = DeviceSource::open(port.as_deref(), next)?;
-                        Ok(Box::new(source) as Box<dyn Line>)
-                    })
-                }
-            };
+            let opener = self.text.opener(port, several.then_some(k), None)?;
             Ok((place, opener))
         });
-        each.collect()
+        openers.collect()
     }
 
     fn of_ports(&self, consume: &mut Consume) -> Result<()> {

@@ -9,7 +9,8 @@ use mimu::plan::design::reach::Fixture;
 use mimu::quantity::Sensor;
 use mimu_recording::error::Result;
 
-use super::{DesignArgs, number};
+use super::DesignArgs;
+use crate::arguments::number;
 
 /// White noise, or the noise file.
 #[derive(Clone)]

@@ -6,19 +6,20 @@ use clap::Args;
 use jiff::Timestamp;
 use mimu_device::{DeviceResult, Pose, SHORTEST_TRIM_S, trim};
 use mimu_recording::error::{Error, Result};
+use nalgebra::Vector3;
 
-use super::{PortArgs, duration, open};
-use crate::arguments::JsonArgs;
+use super::{PortArgs, duration, open, side};
+use crate::arguments::{JsonArgs, number};
 use crate::output::{check_outputs, print, progress};
 use crate::report;
 
 #[derive(Args)]
 pub struct TrimArgs {
     /// Body axis that points up while the unit lies level: the accelerometer is trimmed too [default: only the gyro, in any pose]
-    #[arg(long, value_name = "±AXIS", requires = "gravity_mps2", allow_hyphen_values = true, value_parser = up)]
-    up: Option<[f64; 3]>,
+    #[arg(long, value_name = "±AXIS", requires = "gravity_mps2", allow_hyphen_values = true, value_parser = side)]
+    up: Option<Vector3<f64>>,
     /// Local gravity, m/s²
-    #[arg(long = "gravity", value_name = "M/S²", requires = "up", value_parser = gravity)]
+    #[arg(long = "gravity", value_name = "M/S²", requires = "up", value_parser = |t: &str| number(t, 9.7, 9.9))]
     gravity_mps2: Option<f64>,
     /// Averaging time of the output, before and after
     #[arg(long = "for", value_name = "TIME", default_value = "20s", value_parser = duration)]
@@ -27,28 +28,6 @@ pub struct TrimArgs {
     port: PortArgs,
     #[command(flatten)]
     json: JsonArgs,
-}
-
-/// Parses `+z`, `-x` and similar.
-fn up(text: &str) -> std::result::Result<[f64; 3], String> {
-    let (sign, axis) = match text.as_bytes() {
-        [b'+', axis] | [axis] => (1.0, *axis),
-        [b'-', axis] => (-1.0, *axis),
-        _ => (0.0, 0),
-    };
-    match axis {
-        b'x' => Ok([sign, 0.0, 0.0]),
-        b'y' => Ok([0.0, sign, 0.0]),
-        b'z' => Ok([0.0, 0.0, sign]),
-        _ => Err("write the axis that points up: +x, -x, +y, -y, +z or -z".into()),
-    }
-}
-
-fn gravity(text: &str) -> std::result::Result<f64, String> {
-    match text.parse() {
-        Ok(gravity) if (9.7..=9.9).contains(&gravity) => Ok(gravity),
-        _ => Err("on Earth it is 9.7 to 9.9 m/s²".into()),
-    }
 }
 
 pub fn run_trim(args: &TrimArgs) -> Result<()> {
@@ -67,7 +46,7 @@ pub fn run_trim(args: &TrimArgs) -> Result<()> {
         force_mps2: args
             .up
             .zip(args.gravity_mps2)
-            .map(|(up, gravity)| up.map(|axis| axis * gravity)),
+            .map(|(up, gravity)| (up * gravity).into()),
     };
     let now_s = u64::try_from(Timestamp::now().as_second()).unwrap_or(0);
     let mut session = open(&args.port)?;
@@ -78,19 +57,4 @@ pub fn run_trim(args: &TrimArgs) -> Result<()> {
     bar.finish();
     let result = DeviceResult::new("trim", session.port(), done?);
     print(&args.json, &report::trim_text(&result), &result, None)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_axis_that_points_up_has_a_sign_or_none() {
-        assert_eq!(up("+z"), Ok([0.0, 0.0, 1.0]));
-        assert_eq!(up("z"), Ok([0.0, 0.0, 1.0]));
-        assert_eq!(up("-x"), Ok([-1.0, 0.0, 0.0]));
-        for bad in ["", "+", "w", "+zz", "up", "é"] {
-            assert!(up(bad).is_err(), "{bad}");
-        }
-    }
 }

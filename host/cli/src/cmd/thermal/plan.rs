@@ -8,13 +8,11 @@ use mimu::plan::design::budget::DwellNoise;
 use mimu::quantity::Sensor;
 use mimu::signal::blocks::extent;
 use mimu_recording::error::Result;
-use mimu_recording::result_file::stage;
 use mimu_thermal::basis::Shape;
 use mimu_thermal::plan::{Procedure, Request, plan, to_toml};
 
-use crate::arguments::JsonArgs;
-use crate::cmd::design::number;
-use crate::output::{check_outputs, print};
+use crate::arguments::{JsonArgs, number, range_c};
+use crate::output::{Results, check_outputs};
 use crate::report;
 
 #[derive(Args)]
@@ -23,7 +21,7 @@ pub(super) struct PlanArgs {
     #[arg(long, value_enum)]
     procedure: ProcedureArg,
     /// Temperatures of the chamber, °C
-    #[arg(long, value_name = "FROM..TO", default_value = "-10..70", allow_hyphen_values = true, value_parser = range)]
+    #[arg(long, value_name = "FROM..TO", default_value = "-10..70", allow_hyphen_values = true, value_parser = range_c)]
     range: [f64; 2],
     /// Temperatures of the chamber in turn, °C, each with the minutes it is held, for niu and ramp; 25,-35:30,75:60,-35:30 is niu's first profile
     #[arg(long, value_name = "C[:MIN],...", value_delimiter = ',', allow_hyphen_values = true, value_parser = held, conflicts_with_all = ["range", "soak"])]
@@ -80,15 +78,6 @@ enum CurvesArg {
     Line,
     /// One cubic, from 20 K
     Cubic,
-}
-
-fn range(text: &str) -> std::result::Result<[f64; 2], String> {
-    let ends = text.split_once("..");
-    let ends = ends.and_then(|(from, to)| Some([from.parse().ok()?, to.parse().ok()?]));
-    match ends {
-        Some([from, to]) if -100.0 <= from && from < to && to <= 300.0 => Ok([from, to]),
-        _ => Err("write two temperatures, the lower first, as -10..70".into()),
-    }
 }
 
 /// A temperature, °C, and the time that it is held, s.
@@ -155,11 +144,8 @@ pub(super) fn run(args: &PlanArgs) -> Result<()> {
     let stated: Vec<_> = args.noise.as_deref().into_iter().collect();
     check_outputs(&[args.output.as_deref(), args.json.file()], &stated)?;
     let planned = plan(&args.request()?)?;
-    let mut text = report::thermal_plan_text(&planned);
-    let mut file = None;
-    if let Some(path) = &args.output {
-        file = Some(stage(path, to_toml(&planned, args.sample_rate))?);
-        text.push_str(&format!("\nplan: {}\n", path.display()));
-    }
-    print(&args.json, &text, &planned, file)
+    let mut out = Results::new(report::thermal_plan_text(&planned));
+    let made = || Ok(to_toml(&planned, args.sample_rate));
+    out.file("plan", args.output.as_ref(), made)?;
+    out.print(&args.json, &planned)
 }

@@ -6,7 +6,6 @@ use std::sync::atomic::Ordering;
 use clap::Args;
 use indicatif::ProgressBar;
 use mimu::plan::Plan;
-use mimu_device::Session;
 use mimu_device::record::{Procedure, RecordOptions, Steps};
 use mimu_equipment::carry_out::{Equipped, Progress, carry_out};
 use mimu_equipment::drive::{Driver, TextDriver};
@@ -14,7 +13,7 @@ use mimu_recording::Growing;
 use mimu_recording::error::Result;
 
 use crate::arguments::JsonArgs;
-use crate::cmd::device::{PortArgs, interruption};
+use crate::cmd::device::{PortArgs, interruption, open};
 use crate::cmd::record::RecordingArgs;
 use crate::output::{check_outputs, print, progress};
 use crate::report;
@@ -68,10 +67,7 @@ pub(super) fn run(args: &RecordArgs) -> Result<()> {
         latitude_deg: args.of.latitude_deg(Some(&plan)),
         format: args.of.format,
     };
-    let mut session = Session::open(args.port.path.as_deref())?;
-    for warning in &session.who().warnings {
-        eprintln!("warning: {warning}");
-    }
+    let mut session = open(&args.port)?;
     begin(&procedure, &equipped);
     let stop = interruption()?;
     let mut lines = Lines::new(equipped.has_chamber());

@@ -14,11 +14,10 @@ use mimu_wizard::event::View;
 use mimu_wizard::session::{UnitSpec, run as carry_out};
 use mimu_wizard::source::{Opener, Source};
 use mimu_wizard::station::at_port;
-use mimu_wizard::text::Text;
 use mimu_wizard::text_port::TextOpener;
 use mimu_wizard::turn::complete;
 
-use super::{WizardArgs, begun_rate_hz, check_stored};
+use super::{TextArgs, WizardArgs, begun_rate_hz, check_stored};
 use crate::cmd::device::interruption;
 use crate::output::{check_outputs, print};
 use crate::report;
@@ -26,49 +25,58 @@ use crate::views::answers::Typed;
 use crate::views::lines::Lines;
 use crate::views::screen::Screen;
 
-/// Opens a board that writes lines of text, again at each call.
-fn opener(text: Text, folder: &Path) -> Opener {
-    let mut opener = TextOpener::new(text, begun_rate_hz(folder));
-    Box::new(move |next| {
-        let source = opener.open(next)?;
-        Ok(Box::new(source) as Box<dyn Source>)
-    })
+impl TextArgs {
+    /// Opens the board at this port, again at each call; without a port, the only one at which a device greets. `k` is its index if there are several,
+    /// `rate_hz` the rate of its resumed session.
+    pub(crate) fn opener(
+        &self,
+        port: Option<&String>,
+        k: Option<usize>,
+        rate_hz: Option<f64>,
+    ) -> Result<Opener> {
+        let Some(names) = &self.text else {
+            let port = port.cloned();
+            return Ok(Box::new(move |next| {
+                let source = DeviceSource::open(port.as_deref(), next)?;
+                Ok(Box::new(source) as Box<dyn Source>)
+            }));
+        };
+        // A board that writes lines of text cannot be identified, so the user has to name its port.
+        let Some(port) = port else {
+            let mimu_device::Ports {
+                of_boards, others, ..
+            } = mimu_device::ports();
+            let there = [of_boards, others].concat().join(", ");
+            let problem =
+                format!("the port that writes the lines is not given; there are: {there}");
+            return Err(Error::new("--text", problem, "name it with --port"));
+        };
+        let mut opener = TextOpener::new(self.board(names, port, k)?, rate_hz);
+        Ok(Box::new(move |next| {
+            Ok(Box::new(opener.open(next)?) as Box<dyn Source>)
+        }))
+    }
+}
+
+/// The ports, or that of the only device.
+pub(crate) fn each(ports: &[String]) -> Vec<Option<&String>> {
+    match ports {
+        [] => vec![None],
+        ports => ports.iter().map(Some).collect(),
+    }
 }
 
 impl WizardArgs {
     /// The units with their ports and folders.
     fn wanted(&self) -> Result<Vec<UnitSpec>> {
-        let ports: Vec<Option<String>> = match (self.ports.as_slice(), &self.text.text) {
-            ([], None) => vec![None],
-            // A board that writes lines of text cannot be identified, so the user has to name its port.
-            ([], Some(_)) => {
-                let mimu_device::Ports {
-                    of_boards, others, ..
-                } = mimu_device::ports();
-                let there = [of_boards, others].concat().join(", ");
-                let problem =
-                    format!("the port that writes the lines is not given; there are: {there}");
-                return Err(Error::new("--text", problem, "name it with --port"));
-            }
-            (ports, _) => ports.iter().cloned().map(Some).collect(),
-        };
-        let several = ports.len() > 1;
-        let units = (1..).zip(ports).map(|(k, port)| {
+        let several = self.ports.len() > 1;
+        let units = (1..).zip(each(&self.ports)).map(|(k, port)| {
             let folder = match several {
                 true => self.output.join(format!("board-{k}")),
                 false => self.output.clone(),
             };
-            let opener: Opener = match (&self.text.text, &port) {
-                (Some(names), Some(port)) => {
-                    let number = several.then_some(k);
-                    opener(self.text.board(names, port, number)?, &folder)
-                }
-                _ => Box::new(move |next| {
-                    let source = DeviceSource::open(port.as_deref(), next)?;
-                    Ok(Box::new(source) as Box<dyn Source>)
-                }),
-            };
-            let connect = at_port(opener);
+            let number = several.then_some(k);
+            let connect = at_port(self.text.opener(port, number, begun_rate_hz(&folder))?);
             Ok(UnitSpec { connect, folder })
         });
         units.collect()
