@@ -192,7 +192,7 @@ budget: toolchain ## instructions, load and memory of the firmware, counted on b
 	$(COUNTED)
 	$(CARGO) run --locked -p mimu-board-tests --bin budget
 
-device: toolchain ## the nightly tests of the device; draws docs/device/supply-cuts.svg
+device: toolchain ## the nightly tests of the device
 	$(FIRMWARE)
 	$(CARGO) test --locked --release -p mimu-board-tests -- --ignored --nocapture
 
