@@ -195,13 +195,6 @@ fn whenever_the_supply_is_cut_the_old_or_the_new_calibration_is_there_whole() {
     cut_at_instants(Kind::Nucleo, 8);
 }
 
-/// The flash is the same, the program and its timing are not.
-#[test]
-#[ignore = "nightly: by day the analog board, with the same slots"]
-fn the_same_on_the_board_with_a_digital_sensor() {
-    cut_at_instants(Kind::Matek, 8);
-}
-
 #[test]
 #[ignore = "nightly: 300 starts of each board"]
 fn at_each_of_300_instants_the_old_or_the_new_calibration_is_there_whole() {
@@ -334,37 +327,6 @@ fn a_calibration_of_another_unit_is_refused_and_nothing_is_erased_for_the_one_in
     }
     assert_eq!(device.ask(Request::UploadCommit), Answer::Done);
     assert_eq!(device.download(), Some(other));
-}
-
-#[test]
-#[ignore = "nightly: by day `slots` in the firmware's own tests"]
-fn a_bit_that_flips_in_the_stored_calibration_is_noticed() {
-    let bytes = calibration(7, 3.5);
-    let mut device = with_old(&bytes);
-    let hash = stored::hash(&bytes);
-    let store = device.board.store().unwrap();
-    let place = store
-        .windows(bytes.len())
-        .position(|window| window == bytes)
-        .expect("the calibration is in flash as it was sent");
-    // Bits in every part: header, numbers, CRC.
-    for k in 0..4 {
-        let at = STORE + (place + k * (bytes.len() - 1) / 3) as u64;
-        device.board.flip(at, k as u32).unwrap();
-        device.board.cut_supply(k as u64).unwrap();
-        device.run_for(MS);
-        device.board.restore_supply().unwrap();
-        let Answer::Greeting { hash: found, .. } = device.greeting() else {
-            panic!("no greeting");
-        };
-        assert_eq!(found, None, "bit {} at {at:#x} went unnoticed", k % 8);
-        device.board.flip(at, k as u32).unwrap();
-    }
-    device.board.reset_by_pin(1).unwrap();
-    let Answer::Greeting { hash: found, .. } = device.greeting() else {
-        panic!("no greeting");
-    };
-    assert_eq!(found, Some(hash), "the flips were taken back");
 }
 
 #[test]

@@ -19,57 +19,6 @@ use mimu_rig::rig_file::{RigFile, RigTruth};
 const PATIENCE: Duration = Duration::from_secs(300);
 
 #[test]
-fn a_call_through_the_terminal_is_answered_and_no_byte_is_lost() {
-    let mut served = Served::new(still(Volts::GROUND), Pace::Fast, None).unwrap();
-    let path = served.path().to_owned();
-    // No program has it open: time stands still.
-    for _ in 0..3 {
-        served.step().unwrap();
-    }
-    assert_eq!(served.board().state().ns, 0);
-
-    let port = File::options().read(true).write(true).open(path).unwrap();
-    let done = AtomicBool::new(false);
-    let traffic = std::thread::scope(|scope| {
-        let serving = scope.spawn(|| {
-            let began = Instant::now();
-            while !done.load(Ordering::Relaxed) {
-                assert!(began.elapsed() < PATIENCE, "no answer");
-                served.step().unwrap();
-            }
-            served.traffic()
-        });
-        let mut decoder = Decoder::new();
-        let mut greeting_of = |wanted: u16| {
-            let mut byte = [0];
-            loop {
-                (&port).read_exact(&mut byte).unwrap();
-                let frame = decoder.push(byte[0]);
-                if let Some(Message::Greeting { id, .. }) = frame.and_then(|f| f.message()) {
-                    assert_eq!(id, wanted);
-                    return;
-                }
-            }
-        };
-        // The device's own greeting shows that it listens.
-        greeting_of(0);
-        let mut frame = [0; MAX_FRAME];
-        let call = Call {
-            id: 7,
-            request: Request::Hello,
-        };
-        let length = encode(&call, &mut frame).unwrap();
-        (&port).write_all(&frame[..length]).unwrap();
-        greeting_of(7);
-        done.store(true, Ordering::Relaxed);
-        let traffic = serving.join().unwrap();
-        assert_eq!(traffic.sent, length as u64);
-        traffic
-    });
-    assert_eq!((traffic.lost, traffic.unheard), (0, 0));
-}
-
-#[test]
 fn what_is_in_the_file_is_in_the_flash_and_a_wrong_file_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("unit.flash");
