@@ -164,7 +164,7 @@ station: toolchain ## a session of a station with simulated boards, as docs/stat
 	$(CARGO) build --locked --release --bin mimu --bin mimu-rig
 	./tests/station/session.sh target/release/mimu target/release/mimu-rig
 
-papers: toolchain ## compute every table and plot in docs/papers, and every table of the studies in docs/thermal (hours)
+papers: toolchain ## compute every table and plot in docs/papers, and every table of docs/thermal/papers.md (hours)
 	$(CARGO) run --locked --release -p mimu-tests --bin papers
 	$(CARGO) run --locked --release -p mimu-tests --features studies --bin thermal -- write
 

@@ -1,40 +1,25 @@
-//! Studies over temperature: the tables of the pages in `docs/thermal`. `make papers` computes all of them and inserts them.
+//! The papers' experiments over temperature: the tables of `docs/thermal/papers.md`. `make papers` computes all of them and inserts them.
 //!
 //! `cargo run --release -p mimu-tests --features studies --bin thermal --` with one of
 //!
 //! | command | what |
 //! |---|---|
-//! | `dies [RUNS]` | errors of the joint estimate, their bounds, and how often its intervals contain the truth |
-//! | `estimators [RUNS]` | estimators side by side, on a soak and on a ramp |
 //! | `fang [RUNS]` | fang's soak, with and without misalignments |
 //! | `compensation` | niu's six tests of compensation, by the device's arithmetic |
-//! | `sweep [RUNS]` | poses spread over the sphere while the temperature goes up and down, with the default unit |
 //! | `repeatability` | niu's three ramps against his soak both ways |
-//! | `planned [RUNS]` | what `mimu thermal plan --procedure ramp` promises |
 //! | `write [COMMAND ...]` | these tables, or all, into the pages, each with the number of runs of the pages |
 
 mod compensation;
-mod dies;
 mod fang;
 mod on_bench;
-mod planned;
 mod repeatability;
-mod side_by_side;
-mod simulation;
-mod soak;
-mod study;
-mod sweep;
 
 use std::process::ExitCode;
 
 use mimu_tests::page::{Block, Pages};
 
 /// The pages with places for tables.
-const PAGES: [&str; 3] = [
-    "thermal/measured.md",
-    "thermal/papers.md",
-    "thermal/planning.md",
-];
+const PAGES: [&str; 1] = ["thermal/papers.md"];
 
 /// A command that computes tables.
 struct Study {
@@ -46,19 +31,7 @@ struct Study {
     blocks: fn(u64) -> Vec<Block>,
 }
 
-const STUDIES: [Study; 7] = [
-    Study {
-        command: "dies",
-        runs: 200,
-        names: &dies::NAMES,
-        blocks: dies::blocks,
-    },
-    Study {
-        command: "estimators",
-        runs: 20,
-        names: &side_by_side::NAMES,
-        blocks: side_by_side::blocks,
-    },
+const STUDIES: [Study; 3] = [
     Study {
         command: "fang",
         runs: 1,
@@ -70,18 +43,6 @@ const STUDIES: [Study; 7] = [
         runs: 1,
         names: &compensation::NAMES,
         blocks: compensation::blocks,
-    },
-    Study {
-        command: "sweep",
-        runs: 20,
-        names: &sweep::NAMES,
-        blocks: sweep::blocks,
-    },
-    Study {
-        command: "planned",
-        runs: 8,
-        names: &planned::NAMES,
-        blocks: planned::blocks,
     },
     Study {
         command: "repeatability",
