@@ -399,41 +399,6 @@ fn a_shift_is_measured_only_if_the_golden_unit_has_not_moved() {
 }
 
 #[test]
-#[ignore = "nightly: half a minute of waiting; by day ports and sides are tested apart"]
-fn a_board_is_turned_to_three_sides_when_the_station_asks() {
-    let folder = place();
-    // Three seconds of each side are used, from one second after Enter on.
-    let sides = [(UP, 11.0), ([-1.0, 0.0, 0.0], 9.0), ([0.0, 1.0, 0.0], 12.0)];
-    let board = board(rows_of(&GOOD, &sides, 41));
-    let arguments = format!(
-        "accept --port {board} --text t_us,ax,ay,az,gx,gy,gz --unit A-7 --faces --level 0.1 \
-         --limits limits.toml --for 3s --gravity 9.80665 --json -"
-    );
-    let mut command = Command::new(env!("CARGO_BIN_EXE_mimu"));
-    command
-        .current_dir(folder.path())
-        .args(arguments.split(' '));
-    command.stdin(Stdio::piped()).stdout(Stdio::piped());
-    let begun = Instant::now();
-    let mut child = command.stderr(Stdio::piped()).spawn().unwrap();
-    let mut keyboard = child.stdin.take().unwrap();
-    for at in [0.0, 14.0, 24.0] {
-        let until = Duration::from_secs_f64(at);
-        std::thread::sleep(until.saturating_sub(begun.elapsed()));
-        writeln!(keyboard).unwrap();
-    }
-    let out = child.wait_with_output().unwrap();
-    let said = String::from_utf8(out.stderr).unwrap();
-    assert_eq!(out.status.code(), Some(0), "{said}");
-    assert_eq!(said.matches("press Enter").count(), 3, "{said}");
-    let document: Value = serde_json::from_slice(&out.stdout).unwrap();
-    assert_eq!(document["unit"], "A-7");
-    let row = measurement(&document, "accel_y_offset");
-    let [value, sigma] = ["value", "sigma"].map(|key| row[key].as_f64().unwrap());
-    assert!((value - 12.0).abs() < 2.0 * sigma && sigma < 2.0, "{row}");
-}
-
-#[test]
 fn a_unit_is_measured_as_found_and_as_left_on_the_same_samples() {
     let folder = place();
     let model = |gyro_z_dps: f64| {

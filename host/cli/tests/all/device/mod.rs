@@ -11,7 +11,6 @@ mod matek;
 mod peer;
 mod ports;
 mod recording;
-mod station;
 mod temperature;
 pub(crate) mod terminal;
 mod thermal_record;

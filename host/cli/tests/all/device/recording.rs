@@ -339,32 +339,6 @@ fn a_recording_goes_on_after_the_cable_was_pulled_and_the_device_s_clock_measure
     assert!((length - 2.999).abs() < 1e-9, "{length}");
 }
 
-/// The gap is measured by this computer's clock, over the calls that remain unanswered meanwhile.
-#[test]
-#[ignore = "nightly: fourteen seconds of waiting"]
-fn a_power_cut_behind_a_port_that_stays_is_a_gap_of_its_length() {
-    let place = Place::new();
-    let away_ms = 8_000;
-    let peer = Peer::new(Script {
-        acts: vec![(1_000, Act::PowerCut { away_ms })],
-        start: Start::PowerOn,
-        ..Script::default()
-    });
-    let arguments = [
-        "record", "--port", &peer.path, "-o", "rec", "--for", "14s", "--json", "-",
-    ];
-    let result = mimu(&place, &arguments).json();
-    assert_eq!(result["broken_off"], serde_json::Value::Null, "{result}");
-    assert_eq!(result["restarts"].as_array().unwrap().len(), 1, "{result}");
-    let (_, rows) = rows(&place, "rec");
-    let [(before, after)] = gaps(&rows)[..] else {
-        panic!("one gap: {:?}", gaps(&rows));
-    };
-    // It may be asked to stream up to seven seconds after it has started.
-    let gap_ms = after - before;
-    assert!(gap_ms > 7_900.0 && gap_ms < 16_000.0, "{gap_ms}");
-}
-
 #[test]
 fn a_plan_by_time_gives_every_sample_of_a_dwell_its_input() {
     let place = Place::new();
