@@ -1,8 +1,6 @@
 //! The search finds optima that are known from elsewhere, and designs are judged as by hand calculation.
 
-mod brute_force;
 mod next_experiment;
-mod polynomials;
 mod population;
 mod schemes;
 mod sphere;

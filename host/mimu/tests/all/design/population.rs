@@ -218,38 +218,6 @@ fn a_prior_without_biases_leaves_them_to_the_dwells() {
 }
 
 #[test]
-fn what_a_fit_with_a_prior_refuses_is_no_design() {
-    let kind = prior(&covariance(1.0));
-    let population = || Population::of(&kind, "kind.toml").unwrap();
-    // A fit needs three poses beside a prior.
-    let two = beside(&kind, 2e-3).best(2, 1).unwrap_err().to_string();
-    assert!(two.contains("at least 3"), "{two}");
-    let table = Model::accel(Reference::Table, &terms("affine"));
-    let table = Problem::accel(table, Fixture::ThreeAxis).unwrap();
-    let refused = table
-        .beside(population(), 2e-3, 0.0)
-        .unwrap_err()
-        .to_string();
-    assert!(refused.contains("by hand"), "{refused}");
-    let mut on_a_table = kind.clone();
-    on_a_table.reference = Reference::Table;
-    let refused = Population::of(&on_a_table, "kind.toml").unwrap_err();
-    assert!(
-        refused
-            .to_string()
-            .starts_with("kind.toml: its reference is \"table\""),
-        "{refused}"
-    );
-    let mut gyro_only = kind.clone();
-    gyro_only.gyro = gyro_only.accel.take();
-    let refused = Population::of(&gyro_only, "kind.toml").unwrap_err();
-    assert!(
-        refused.to_string().contains("no accelerometer"),
-        "{refused}"
-    );
-}
-
-#[test]
 fn a_term_beyond_the_model_shows_against_the_population_too() {
     let sigma = 2e-3;
     let settings = by_hand().best(9, 1).unwrap();
