@@ -1,11 +1,10 @@
 //! The command `mimu design`: its output and its refusals.
 
 use std::path::Path;
-use std::process::Output;
 
-use super::command;
+use super::command::{self, Ran, all_refused, says};
 
-fn mimu(folder: &Path, arguments: &str) -> Output {
+fn mimu(folder: &Path, arguments: &str) -> Ran {
     command::mimu(folder, &format!("design {arguments}"))
 }
 
@@ -34,29 +33,31 @@ fn people_read_the_same_numbers_in_their_units() {
     // 3.242 σ/√(4/3) over full scale.
     let text = |arguments: &str| {
         let all = format!("{arguments} --verbose");
-        String::from_utf8(mimu(Path::new("."), &all).stdout).unwrap()
+        mimu(Path::new("."), &all).stdout
     };
     let accel = text("--scheme six-face --sigma 0.01");
-    for says in [
-        "b_x ± 0.816 mg",
-        "P_xx ± 1413 ppm",
-        "P_xy ± 1413 µrad",
-        "quadratic from 2863 ppm FS",
-        "1.02 mg, given",
-    ] {
-        assert!(accel.contains(says), "{says}: {accel}");
-    }
+    says(
+        &accel,
+        &[
+            "b_x ± 0.816 mg",
+            "P_xx ± 1413 ppm",
+            "P_xy ± 1413 µrad",
+            "quadratic from 2863 ppm FS",
+            "1.02 mg, given",
+        ],
+    );
     // At 300 deg/s: in deg/s, and as a fraction.
     let gyro = text("--scheme six-face --sensor gyro --sigma 0.001");
-    for says in [
-        "b_z ± 0.0458 deg/s",
-        "P_zz ± 265 ppm",
-        "P_zy ± 265 µrad",
-        "quadratic from 536 ppm FS",
-        "0.0573 deg/s, given",
-    ] {
-        assert!(gyro.contains(says), "{says}: {gyro}");
-    }
+    says(
+        &gyro,
+        &[
+            "b_z ± 0.0458 deg/s",
+            "P_zz ± 265 ppm",
+            "P_zy ± 265 µrad",
+            "quadratic from 536 ppm FS",
+            "0.0573 deg/s, given",
+        ],
+    );
 }
 
 #[test]
@@ -65,11 +66,7 @@ fn the_plan_is_the_design() {
     let arguments =
         "--sensor gyro -n 8 --model affine,cubic --dwell 12.5 -o plan.toml --json plan.json";
     let out = mimu(folder.path(), arguments);
-    assert!(
-        out.status.success(),
-        "{}",
-        String::from_utf8_lossy(&out.stderr)
-    );
+    assert_eq!(out.status, Some(0), "{}", out.stderr);
     let plan: toml::Table = std::fs::read_to_string(folder.path().join("plan.toml"))
         .unwrap()
         .parse()
@@ -114,12 +111,8 @@ fn text_fits_a_hundred_columns() {
     ];
     for arguments in all {
         let out = mimu(Path::new("."), arguments);
-        assert!(
-            out.status.success(),
-            "{arguments}: {}",
-            String::from_utf8_lossy(&out.stderr)
-        );
-        let text = String::from_utf8(out.stdout).unwrap();
+        assert_eq!(out.status, Some(0), "{arguments}: {}", out.stderr);
+        let text = out.stdout;
         assert!(text.lines().count() <= 25, "{arguments}: {text}");
         for line in text.lines() {
             assert!(line.chars().count() <= 100, "{arguments}: {line}");
@@ -138,7 +131,7 @@ fn a_lot_is_drawn_unless_the_order_is_given_and_says_its_price() {
     );
     let longer = randomised["moves_s"].as_f64().unwrap() - shortest["moves_s"].as_f64().unwrap();
     assert!(longer > 1.0 && shortest["moves_s"] == randomised["shortest_moves_s"]);
-    let text = String::from_utf8(mimu(Path::new("."), "-n 9 --verbose").stdout).unwrap();
+    let text = mimu(Path::new("."), "-n 9 --verbose").stdout;
     assert!(text.contains(&format!("{longer:.1} s longer")), "{text}");
     // The same dwells: in a different order for another seed, in the same order for the same seed.
     let sorted = |mut list: Vec<serde_json::Value>| {
@@ -189,17 +182,7 @@ fn refusals_are_one_line_with_status_1_and_wrong_usage_has_status_2() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::create_dir(folder.path().join("folder")).unwrap();
     std::fs::write(folder.path().join("there"), "kept").unwrap();
-    for (arguments, status, says) in cases {
-        let out = mimu(folder.path(), arguments);
-        let error = String::from_utf8(out.stderr).unwrap();
-        assert_eq!(out.status.code(), Some(status), "{arguments}: {error}");
-        assert!(error.contains(says), "{arguments}: {error}");
-        assert!(
-            status == 2 || error.lines().count() == 1,
-            "{arguments}: {error}"
-        );
-        assert!(out.stdout.is_empty(), "{arguments}");
-    }
+    all_refused(folder.path(), "design", &cases);
     // Nothing was written or left behind.
     let there = std::fs::read_to_string(folder.path().join("there")).unwrap();
     let count = |path: &Path| std::fs::read_dir(path).unwrap().count();

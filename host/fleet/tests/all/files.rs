@@ -2,7 +2,6 @@
 
 use std::fs;
 use std::path::Path;
-use std::time::Instant;
 
 use mimu::calibration::Calibration;
 use mimu::data_sheet::Part;
@@ -12,7 +11,7 @@ use mimu_fleet::labels::LabelTable;
 use mimu_fleet::tree::{Measurement, Search, Tree};
 use mimu_fleet::{Options, fleet};
 
-use crate::plant::{Plant, processor_time};
+use crate::plant::Plant;
 
 /// A file with the parameters of `measurement`.
 pub fn file(measurement: &Measurement) -> String {

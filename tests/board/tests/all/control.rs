@@ -24,8 +24,6 @@ use super::power::calibration;
 /// If no answer comes, the test fails and does not hang.
 const PATIENCE: Duration = Duration::from_secs(300);
 const G: f64 = 9.793;
-/// More than the sum of all errors of the table: mounting 39 arcseconds, the rest below 20.
-const TABLE: f64 = 60.0 / 206_265.0;
 
 fn commanded(carrier: &str) -> Board {
     let text = format!(
@@ -99,7 +97,6 @@ impl Client {
         let number = |word: &str| word.parse().unwrap_or_else(|_| panic!("{answer}"));
         answer.split(' ').map(number).collect()
     }
-
 }
 
 fn open(path: impl AsRef<Path>) -> File {

@@ -2,15 +2,13 @@
 //! written out here.
 
 use mimu_board::flash::SECTOR;
-use mimu_board::front::Front;
-use mimu_board::schematic::{DIVIDER_RATIO, Net, Volts, WIRING};
 use mimu_board_tests::conversation::{Answer, Conversation};
 use mimu_board_tests::{MS, STARTED, still};
 use mimu_core::stored::hash;
-use mimu_core::wire::{Request, flags};
+use mimu_core::wire::Request;
 
 use super::power::calibration;
-use super::serial::{STREAM, at_rest};
+use super::serial::at_rest;
 
 /// Registers of ADC1 (RM0433 25.6): calibration factors of the offset and of the linearity.
 const CALFACT: u64 = 0x4002_20c4;
@@ -22,7 +20,6 @@ const KEPT: std::ops::Range<usize> = SLOT + 32..SLOT + 96;
 
 /// Bits for the stored quantities.
 const CONVERTER: u32 = 1;
-const PINS: u32 = 2;
 
 fn stores(device: &mut Conversation, bytes: &[u8]) {
     device.upload(bytes);

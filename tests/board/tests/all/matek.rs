@@ -3,20 +3,11 @@
 //! The accelerometer's z axis is a clock: 4 g/s, so each sample says when it was taken by the board's crystal, to 30 µs and the 100 µs within which
 //! the bench brings the sensor up to date. Nothing of the firmware takes part in this evaluation.
 
-use std::collections::BTreeMap;
-
 use mimu_board::inertial::{Feed, Sensed};
 use mimu_board::running::Board;
 use mimu_board_tests::conversation::{Answer, Conversation, Sample};
 use mimu_board_tests::{MS, digital_image};
-use mimu_core::PerSensor;
-use mimu_core::compensation::{Affine, Compensation, Sample as SiSample};
-use mimu_core::effects::DeviceEffect;
-use mimu_core::single;
-use mimu_core::stored::{Curves, MAX_LENGTH, Origin, RawUnit, Setting, decode, encode};
-use mimu_core::table::Node;
-use mimu_core::wire::{BatchHead, Request, Verdict, flags, reading};
-use nalgebra::{Matrix3, Vector3};
+use mimu_core::wire::{Request, Verdict, flags};
 
 /// The clock on the z axis, g/s, and its first value, g.
 const CLOCK: [f64; 2] = [4.0, -15.5];

@@ -2,7 +2,7 @@
 
 use mimu_board::flash::Change;
 use mimu_board::inertial::Sensed;
-use mimu_board::running::{Board, STORE};
+use mimu_board::running::Board;
 use mimu_board::schematic::Volts;
 use mimu_board::serve::{Pace, Served};
 use mimu_board_tests::conversation::{Answer, Conversation};

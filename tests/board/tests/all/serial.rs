@@ -1,15 +1,8 @@
 //! The device behind its serial line: its identity and its samples.
-
-use std::path::Path;
-
-use mimu_board::front::Front;
-use mimu_board::running::Board;
 use mimu_board::schematic::{DIVIDER_RATIO, Net, Volts, WIRING};
-use mimu_board_tests::conversation::{Answer, Conversation, Sample, Tested};
-use mimu_board_tests::{MS, STARTED, image, still};
-use mimu_core::wire::{Request, Verdict, flags};
-use mimu_rig::plan::Plan;
-use mimu_rig::rig_file::{RigFile, RigTruth};
+use mimu_board_tests::conversation::{Answer, Conversation, Sample};
+use mimu_board_tests::{MS, STARTED, still};
+use mimu_core::wire::Request;
 
 pub const STREAM: Request<'_> = Request::Stream {
     raw: true,

@@ -1,9 +1,5 @@
 //! The emulated board behind its pseudo-terminal, as seen by a program that opens serial ports.
-
-use std::fs::File;
-use std::io::{Read, Write};
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use mimu_board::front::Front;
@@ -11,12 +7,8 @@ use mimu_board::running::{Board, STORE};
 use mimu_board::schematic::Volts;
 use mimu_board::serve::{Pace, Served};
 use mimu_board_tests::{MS, STARTED, image, still};
-use mimu_core::wire::{Call, Decoder, MAX_FRAME, Message, Request, encode};
 use mimu_rig::plan::Plan;
 use mimu_rig::rig_file::{RigFile, RigTruth};
-
-/// If the device never answers, the test fails and does not hang.
-const PATIENCE: Duration = Duration::from_secs(300);
 
 #[test]
 fn what_is_in_the_file_is_in_the_flash_and_a_wrong_file_is_refused() {

@@ -8,7 +8,7 @@ mod law;
 mod refused;
 pub mod unit;
 
-use std::process::Command;
+use std::path::Path;
 
 use mimu::calibration::Calibration;
 use mimu::effects;
@@ -21,10 +21,9 @@ use mimu::effects::removal::remove;
 use mimu::quantity::Sensor;
 use mimu_core::compensation::Sample;
 use mimu_core::effects::{Effects, State};
-use mimu_device::Image;
 use nalgebra::Vector3;
 
-use crate::command::says;
+use crate::command::{run as command, says};
 use unit::{CUBIC, SAG, THERMAL, fitted, fitted_effect, named, record};
 
 /// All named effects, some with only part of their coefficients, and three terms; at ten times data-sheet size.
@@ -115,17 +114,13 @@ fn every_effect_comes_back_from_the_file_and_the_device_removes_what_the_pc_does
     assert!(moved[0] > 0.01 && moved[1] > 0.1, "{moved:?}");
 }
 
+/// Whether the command succeeds, and what it prints then or why it fails.
 pub fn mimu(arguments: &[&str]) -> (bool, String) {
-    let run = Command::new(env!("CARGO_BIN_EXE_mimu"))
-        .args(arguments)
-        .output()
-        .unwrap();
-    let text = if run.status.success() {
-        run.stdout
-    } else {
-        run.stderr
-    };
-    (run.status.success(), String::from_utf8(text).unwrap())
+    let ran = command(Path::new("."), arguments);
+    match ran.status {
+        Some(0) => (true, ran.stdout),
+        _ => (false, ran.stderr),
+    }
 }
 
 #[test]

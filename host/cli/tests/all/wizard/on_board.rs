@@ -1,7 +1,7 @@
 //! `mimu wizard` with the firmware's release image on the emulated board, on a turntable and in hands that it commands. Killed, unplugged, garbled
 //! and disturbed sessions end with the right calibration or with a clear message, and never store a wrong one.
 use super::bench::{Bench, in_repository, unit};
-use crate::command::says;
+use crate::command::mimu;
 use mimu::calibration::Calibration;
 use mimu::quantity::Sensor;
 use mimu_rig::rig_file::RigTruth;
@@ -158,14 +158,6 @@ fn a_driver_file_with_a_mistake_is_refused_with_its_line() {
     let driver = folder.path().join("driver.toml");
     let text = std::fs::read_to_string(in_repository("tests/board/demo/turntable.toml")).unwrap();
     std::fs::write(&driver, text.replace("interlock =", "interlok =")).unwrap();
-    let out = std::process::Command::new(env!("CARGO_BIN_EXE_mimu"))
-        .args(["wizard", "--gravity", "9.8", "-o"])
-        .arg(folder.path().join("session"))
-        .arg("--driver")
-        .arg(&driver)
-        .output()
-        .unwrap();
-    let told = String::from_utf8_lossy(&out.stderr);
-    says(&told, &["line 5", "interlok"]);
-    assert_eq!(out.status.code(), Some(1));
+    let arguments = "wizard --gravity 9.8 -o session --driver driver.toml";
+    mimu(folder.path(), arguments).refused(&["line 5", "interlok"]);
 }
