@@ -22,7 +22,7 @@ BUILT := $(or $(CARGO_TARGET_DIR),target)/debug/.tests-built
 # Stages of `make test`; each can be run alone, as in `make clippy`. Tests are linked before they run, so that both times are shown.
 STAGES := fmt clippy rustdoc images no-panic build-tests tests
 
-.PHONY: help data test $(STAGES) run-tests interop python nightly dist book msrv package wheel web web-tests demo faults example station papers blind clumsy bench budget count device fuzz audit toolchain
+.PHONY: help data test $(STAGES) run-tests interop python nightly dist book msrv package wheel web web-tests demo example station papers blind clumsy bench budget count device fuzz audit toolchain
 
 help: ## this list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' Makefile
@@ -43,9 +43,9 @@ test: toolchain ## formatting, lints, documentation, firmware, all tests but the
 	  took="$$took$$(printf '%-12s %4d s' $$stage $$(( $$(date +%s) - begun )))\n"; \
 	done; printf '\n%b' "$$took"
 
-# A fresh build compiles each crate once, so intermediate results for incremental builds are not needed. The demo and the faults use the builds of the
+# A fresh build compiles each crate once, so intermediate results for incremental builds are not needed. The demo uses the builds of the
 # tests: with another setting they would compile the workspace again.
-test $(STAGES) run-tests interop demo faults nightly: export CARGO_INCREMENTAL = 0
+test $(STAGES) run-tests interop demo nightly: export CARGO_INCREMENTAL = 0
 # Lints and documentation share one check of the workspace: both run clippy's driver, with the flags of `cargo clippy -- -D warnings`. What runs is not built
 # by it: it leaves out optimisations of rustc, and the image would not fit its budget.
 clippy rustdoc: export RUSTC_WORKSPACE_WRAPPER = clippy-driver
@@ -153,12 +153,6 @@ demo: toolchain ## calibrate and verify a board on the virtual bench; SEED=n is 
 	@rm -rf $(DEMO)
 	@target/debug/demo $(SEED) $(DEMO) $(BOARD)
 
-faults: toolchain ## a session of the wizard with faults caused on purpose; BOARD=matek with the digital sensor
-	@if [ $(BOARD) = matek ]; then $(MATEK) -q && cp $(IMAGES)/mimu-firmware $(IMAGES)/mimu-firmware-matek-h743; fi
-	@$(FIRMWARE) -q
-	$(CARGO) build --locked -p mimu-cli -p mimu-board-tests --bins
-	target/debug/faults $(BOARD)
-
 data: ## bring the public recordings, 27 MB, into $MIMU_DATA or ../shared/data, so that the tests on real units run
 	./tests/data.sh
 
@@ -198,7 +192,7 @@ budget: toolchain ## instructions, load and memory of the firmware, counted on b
 	$(COUNTED)
 	$(CARGO) run --locked -p mimu-board-tests --bin budget
 
-device: toolchain ## the nightly tests of the device; draws docs/device/supply-cuts.svg
+device: toolchain ## the nightly tests of the device
 	$(FIRMWARE)
 	$(CARGO) test --locked --release -p mimu-board-tests -- --ignored --nocapture
 

@@ -6,7 +6,6 @@
 //! | | |
 //! |---|---|
 //! | `blind by-hand SEEDS CLEAN [NAME...]` | the same for units by hand, for each grade |
-//! | `blind joint SETS [FIRST]` | 2 to 9 sessions of one unit diagnosed together, and their file on another session; seeds from FIRST on |
 //! | `blind earth RUNS [NAME...]` | the Earth's rate in the biases of gyros on a table, with the latitude and without it |
 //! | `blind judged SESSIONS [NAME...]` | judgements of clean sessions of each kind, and of sessions with an effect of five times the noise: false alarms and power; NAMEs select kinds |
 //! | `blind judged array` | judgements of an array of eight units, recorded by other people in nine sessions, with a planted quadratic and without it |
@@ -14,7 +13,6 @@
 
 mod by_hand;
 mod earth;
-mod joint;
 mod judged;
 mod planted;
 
@@ -109,9 +107,8 @@ const HEAD: &str = "| | cases | detected | named right | right and more | named 
 fn main() {
     let mut args: Vec<String> = std::env::args().skip(1).collect();
     let in_hands = args.first().is_some_and(|a| a == "by-hand");
-    let joint = args.first().is_some_and(|a| a == "joint");
     let planted = args.first().is_some_and(|a| a == "planted");
-    if in_hands || joint || planted {
+    if in_hands || planted {
         args.remove(0);
     }
     if args.first().is_some_and(|a| a == "earth") {
@@ -129,9 +126,6 @@ fn main() {
     }
     let number = |k: usize, default| args.get(k).and_then(|s| s.parse().ok()).unwrap_or(default);
     let (seeds, clean): (u64, u64) = (number(0, 20), number(1, 200));
-    if joint {
-        return joint::run(number(0, 100), number(1, 0));
-    }
     let chosen: Vec<&str> = args.iter().skip(2).map(String::as_str).collect();
     if planted {
         let times = args.get(1).and_then(|s| s.parse().ok()).unwrap_or(1.0);

@@ -5,7 +5,6 @@
 //! | [`mod@bench`]          | units with known truth on the virtual bench, read as a user's would be |
 //! | [`blind`], [`by_hand`] | units with undeclared effects, on a table and by hand             |
 //! | [`judged`]             | judgements of clean sessions and of sessions with an effect of known strength |
-//! | [`joint`]              | several sessions of one unit together, and their file on another session |
 //! | [`sessions`]           | several sessions of one unit, and one that they predict           |
 //! | [`fleet`] | units of one population, and the prior of it                  |
 //! | [`slow_bias`]          | units by hand whose biases move with time or temperature, at once or with a lag |
@@ -32,7 +31,6 @@ pub mod coverage;
 pub mod earth;
 pub mod fleet;
 pub mod flight;
-pub mod joint;
 pub mod judged;
 pub mod niu;
 pub mod noise_in_use;

@@ -2,8 +2,6 @@
 
 use std::path::Path;
 
-use mimu_rig::rig_file::RigTruth;
-
 type Matrix = [[f64; 3]; 3];
 type Vector = [f64; 3];
 
@@ -56,24 +54,6 @@ fn own_axes(accel: &Matrix) -> Matrix {
 }
 
 impl Truth {
-    /// Truth of the bench's unit.
-    pub fn of(truth: &RigTruth, by_hand: bool) -> Result<Self, String> {
-        let unit = &truth.file.unit;
-        // The firmware measures analog gyros against the reference pin of the first, assuming its nominal voltage. A digital unit has no such pin.
-        let ratios = [unit.gyro_reference_v.map_or(1.0, |pins| 2.5 / pins[0]), 1.0];
-        let affine = [&unit.gyro_affine, &unit.accel_affine];
-        let mut triads = [Forward {
-            matrix: [[0.0; 3]; 3],
-            bias: [0.0; 3],
-        }; 2];
-        for ((to, from), ratio) in triads.iter_mut().zip(affine).zip(ratios) {
-            let from = from.as_ref().ok_or("the unit has no affine model")?;
-            to.matrix = from.matrix.map(|row| row.map(|m| ratio * m));
-            to.bias = from.bias.map(|b| ratio * b);
-        }
-        Ok(Self { triads, by_hand })
-    }
-
     /// Axes of the calibration in the body frame, by rows.
     fn axes(&self) -> Matrix {
         match self.by_hand {

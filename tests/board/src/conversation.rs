@@ -75,8 +75,6 @@ pub struct Conversation {
     pub lost: (u32, u32),
     /// Head of the last raw batch, and the temperatures of its first three thermometers, °C.
     pub last: Option<(BatchHead, [f32; 3])>,
-    /// Every received byte, if a test has put a list here.
-    pub kept: Option<Vec<u8>>,
 }
 
 impl Conversation {
@@ -91,7 +89,6 @@ impl Conversation {
             compensated: Vec::new(),
             lost: (0, 0),
             last: None,
-            kept: None,
         }
     }
 
@@ -109,9 +106,6 @@ impl Conversation {
     /// Processes what has arrived.
     pub fn listen(&mut self) {
         for (_, byte) in self.board.receive() {
-            if let Some(kept) = &mut self.kept {
-                kept.push(byte);
-            }
             let Some(frame) = self.decoder.push(byte) else {
                 continue;
             };

@@ -3,12 +3,10 @@
 //! | where                | what                                                                                 |
 //! |----------------------|--------------------------------------------------------------------------------------|
 //! | [`conversation`]     | the host's end of the serial line                                                    |
-//! | [`mod@traces`], `traces/` | the device's output in each kind of step, which `core` computes again           |
 //! | `tests/all/`         | sampling, the line, restarts, cuts of the supply, the pseudo-terminal                |
 //! | `budget/`            | cost of the firmware, against `budget.toml`                                          |
 
 pub mod conversation;
-pub mod traces;
 
 use std::path::PathBuf;
 

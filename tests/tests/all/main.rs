@@ -9,7 +9,6 @@ mod few_poses;
 mod flaws;
 mod fleet;
 mod frozen;
-mod joint;
 mod judged;
 mod judgement;
 mod led_mistakes;

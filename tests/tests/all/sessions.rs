@@ -217,12 +217,6 @@ fn clean_sessions_do_not_contradict_themselves() {
 }
 
 #[test]
-#[ignore = "nightly: 40 sets of four sessions, a minute"]
-fn forty_sets_of_clean_sessions_do_not_contradict_themselves() {
-    clean_sets(20);
-}
-
-#[test]
 fn each_session_is_given_once_and_all_are_of_one_unit() {
     let mut fits = on_bench(5, Life::PowerOn, 3);
     for (k, fit) in fits.iter_mut().enumerate() {

@@ -377,29 +377,6 @@ fn a_bound_that_is_exported_and_codes_coarser_than_the_noise_are_untested() {
 }
 
 #[test]
-fn drift_at_the_long_end_is_told_and_hadamard_shown_beside_it() {
-    let folder = tempfile::tempdir().unwrap();
-    let mut rows = at_rest(30_000);
-    for row in &mut rows {
-        row[1] += 3e-5 * row[0];
-    }
-    write(folder.path(), &rows);
-    let json: serde_json::Value =
-        serde_json::from_str(&done(folder.path(), "allan r --json -")).unwrap();
-    assert!(
-        json["warnings"].to_string().contains("gyro_x: a drift"),
-        "{}",
-        json["warnings"]
-    );
-    let r = json["channels"][0]["r"]["value"].as_f64().unwrap();
-    assert!((r / 3e-5 - 1.0).abs() < 0.3, "{r}");
-    let last = |of: &serde_json::Value| of.as_array().unwrap().last().unwrap().as_f64().unwrap();
-    let hadamard = &json["channels"][0]["hadamard"];
-    assert!(last(&hadamard["hdev"]) < 0.3 * last(&json["channels"][0]["adev"]));
-    assert!(json["channels"][1]["hadamard"].is_null());
-}
-
-#[test]
 fn a_swaying_building_is_named_and_the_white_noise_beneath_is_exported() {
     let folder = tempfile::tempdir().unwrap();
     let mut rows = at_rest(60_000);
@@ -482,46 +459,6 @@ fn readings_in_volts_become_si_by_the_calibration_of_the_unit() {
     one_noise_file_serves_all(folder.path());
     let error = refused(folder.path(), "export kalibr -o imu.yaml --noise cal.toml");
     assert!(error.contains("cal.toml: this is a calibration"), "{error}");
-}
-
-/// A driver's SI may be inaccurate. The scale factors of the calibration then differ from 1, and the noise of the readings is not that of the unit.
-#[test]
-fn noise_of_readings_in_si_is_the_same_for_a_fit_with_and_without_a_calibration() {
-    let folder = tempfile::tempdir().unwrap();
-    let plan = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../rig/plans/table.toml");
-    let plan = Plan::read(&plan).unwrap();
-    let truth = RigTruth::resolve(&RigFile::default(), 5).unwrap();
-    let output = mimu_rig::record::Output::new(&folder.path().join("r"), &plan).unwrap();
-    mimu_rig::record::write(&plan, &truth, 5, &output).unwrap();
-    let manifest = folder.path().join("r/recording.toml");
-    let text = std::fs::read_to_string(&manifest).unwrap();
-    let si = text.replace("raw_unit = \"V\"", "raw_unit = \"SI\"");
-    assert_ne!(si, text);
-    std::fs::write(&manifest, si).unwrap();
-    done(folder.path(), "fit r -o cal.toml");
-    done(folder.path(), "allan r --step 2 -o raw.toml");
-    let text = done(
-        folder.path(),
-        "allan r --step 2 --calibration cal.toml -o both.toml",
-    );
-    assert!(
-        text.contains("calibrated: noise of the readings divided by the scale factors"),
-        "{text}"
-    );
-    let n = |name: &str| {
-        let file = NoiseFile::read(&folder.path().join(name)).unwrap();
-        let channel = file.channel[0].clone();
-        (channel.n.unwrap().value, channel.scale_factor)
-    };
-    let ((raw, none), (unit, scale)) = (n("raw.toml"), n("both.toml"));
-    assert!(none.is_none() && (unit * scale.unwrap() / raw - 1.0).abs() < 1e-9);
-    for command in ["fit r", "verify r --calibration cal.toml"] {
-        let [raw, both] = ["raw", "both"].map(|n| {
-            let text = done(folder.path(), &format!("{command} --noise {n}.toml"));
-            text.replace(&format!("{n}.toml"), "the file")
-        });
-        assert_eq!(raw, both, "{command}");
-    }
 }
 
 /// With a calibration, the file still serves commands that read volts, and also those that need SI.

@@ -6,10 +6,8 @@ use mimu_rig::located::Source;
 use mimu_rig::plan::Plan;
 use mimu_rig::record;
 use mimu_rig::rig_file::{RigFile, RigTruth};
-use serde_json::Value;
 
-use super::command::{done, mimu};
-use crate::command::says;
+use super::command::{done, json, mimu, says};
 
 const PARTICULARS: &str = r#"
 format = "mimu-particulars/1"
@@ -92,8 +90,7 @@ fn a_certificate_has_the_results_of_the_fit_with_their_uncertainties() {
     on_table(at, "new", 2, STATED);
     std::fs::write(at.join("lab.toml"), PARTICULARS).unwrap();
     done(at, "fit old -o old.toml");
-    let fit = done(at, "fit new -o new.toml --json -");
-    let fit: Value = serde_json::from_str(&fit).unwrap();
+    let fit = json(at, "fit new -o new.toml");
     done(
         at,
         "report new --certificate lab.toml --as-found old.toml --calibration new.toml -o page.html",
@@ -164,18 +161,22 @@ fn the_same_calibration_as_found_has_not_changed_and_another_file_is_refused() {
         lines.collect::<Vec<_>>().join("\n"),
     )
     .unwrap();
-    let out = mimu(
-        at,
-        "report one --certificate lab.toml --as-found another.toml -o other.html",
+    says(
+        &mimu(
+            at,
+            "report one --certificate lab.toml --as-found another.toml -o other.html",
+        )
+        .stderr,
+        &["another.toml: it is of \"another\""],
     );
-    let said = String::from_utf8_lossy(&out.stderr);
-    says(&said, &["another.toml: it is of \"another\""]);
-    let out = mimu(
-        at,
-        "report one --certificate lab.toml --calibration two.toml -o other.html",
+    says(
+        &mimu(
+            at,
+            "report one --certificate lab.toml --calibration two.toml -o other.html",
+        )
+        .stderr,
+        &["it was made from another recording"],
     );
-    let said = String::from_utf8_lossy(&out.stderr);
-    says(&said, &["it was made from another recording"]);
     assert!(!at.join("other.html").exists());
 }
 
@@ -188,14 +189,14 @@ fn one_error_names_all_that_a_certificate_lacks() {
         .replace("number = \"2026-117\"", "")
         .replace("address = \"2 Short Road\"", "");
     std::fs::write(at.join("lab.toml"), text).unwrap();
-    let out = mimu(at, "report rec --certificate lab.toml -o page.html");
-    let said = String::from_utf8_lossy(&out.stderr);
-    assert!(
-        said.contains("lab.toml: a certificate needs number, customer.address, traceability;"),
-        "{said}"
+    let said = mimu(at, "report rec --certificate lab.toml -o page.html").stderr;
+    says(
+        &said,
+        &["lab.toml: a certificate needs number, customer.address, traceability;"],
     );
     assert!(!at.join("page.html").exists());
-    let out = mimu(at, "report rec rec --certificate lab.toml -o page.html");
-    let said = String::from_utf8_lossy(&out.stderr);
-    says(&said, &["a certificate is made from one, and 2 are given"]);
+    says(
+        &mimu(at, "report rec rec --certificate lab.toml -o page.html").stderr,
+        &["a certificate is made from one, and 2 are given"],
+    );
 }

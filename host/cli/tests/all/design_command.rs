@@ -1,11 +1,10 @@
 //! The command `mimu design`: its output and its refusals.
 
 use std::path::Path;
-use std::process::Output;
 
-use super::command;
+use super::command::{self, Ran, all_refused, says};
 
-fn mimu(folder: &Path, arguments: &str) -> Output {
+fn mimu(folder: &Path, arguments: &str) -> Ran {
     command::mimu(folder, &format!("design {arguments}"))
 }
 
@@ -33,7 +32,7 @@ fn people_read_the_same_numbers_in_their_units() {
     // Six faces: bias ± 1.96 σ/√6, scale factor ± 1.96 σ/(√2 g), P_xy the same in µrad.
     let text = |arguments: &str| {
         let all = format!("{arguments} --verbose");
-        String::from_utf8(mimu(Path::new("."), &all).stdout).unwrap()
+        mimu(Path::new("."), &all).stdout
     };
     let accel = text("-n 6 --sigma 0.01");
     for says in [
@@ -61,11 +60,7 @@ fn the_plan_is_the_design() {
     let folder = tempfile::tempdir().unwrap();
     let arguments = "--sensor gyro -n 8 --dwell 12.5 -o plan.toml --json plan.json";
     let out = mimu(folder.path(), arguments);
-    assert!(
-        out.status.success(),
-        "{}",
-        String::from_utf8_lossy(&out.stderr)
-    );
+    assert_eq!(out.status, Some(0), "{}", out.stderr);
     let plan: toml::Table = std::fs::read_to_string(folder.path().join("plan.toml"))
         .unwrap()
         .parse()
@@ -103,12 +98,8 @@ fn text_fits_a_hundred_columns() {
     ];
     for arguments in all {
         let out = mimu(Path::new("."), arguments);
-        assert!(
-            out.status.success(),
-            "{arguments}: {}",
-            String::from_utf8_lossy(&out.stderr)
-        );
-        let text = String::from_utf8(out.stdout).unwrap();
+        assert_eq!(out.status, Some(0), "{arguments}: {}", out.stderr);
+        let text = out.stdout;
         assert!(text.lines().count() <= 25, "{arguments}: {text}");
         for line in text.lines() {
             assert!(line.chars().count() <= 100, "{arguments}: {line}");
@@ -154,17 +145,7 @@ fn refusals_are_one_line_with_status_1_and_wrong_usage_has_status_2() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::create_dir(folder.path().join("folder")).unwrap();
     std::fs::write(folder.path().join("there"), "kept").unwrap();
-    for (arguments, status, says) in cases {
-        let out = mimu(folder.path(), arguments);
-        let error = String::from_utf8(out.stderr).unwrap();
-        assert_eq!(out.status.code(), Some(status), "{arguments}: {error}");
-        assert!(error.contains(says), "{arguments}: {error}");
-        assert!(
-            status == 2 || error.lines().count() == 1,
-            "{arguments}: {error}"
-        );
-        assert!(out.stdout.is_empty(), "{arguments}");
-    }
+    all_refused(folder.path(), "design", &cases);
     // Nothing was written or left behind.
     let there = std::fs::read_to_string(folder.path().join("there")).unwrap();
     let count = |path: &Path| std::fs::read_dir(path).unwrap().count();

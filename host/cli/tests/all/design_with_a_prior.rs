@@ -4,8 +4,7 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
-use super::command;
-use crate::command::says;
+use super::command::{self, all_refused, says};
 
 /// 0.8 % of 1665 counts per m/s², 4 mrad, 0.2 m/s².
 const SIZES: [f64; 9] = [13.32, 13.32, 13.32, 4e-3, 4e-3, 4e-3, 333.0, 333.0, 333.0];
@@ -215,17 +214,7 @@ fn what_a_prior_is_not_for_is_refused_by_its_name() {
         ("--prior kind.toml --target gyro-bias=1", 1, "mimu wizard"),
         ("--prior kind.toml -n 6 --target accel-bias=1", 2, "cannot be used with"),
     ];
-    for (arguments, status, says) in cases {
-        let out = command::mimu(folder.path(), &format!("design {arguments}"));
-        let error = String::from_utf8(out.stderr).unwrap();
-        assert_eq!(out.status.code(), Some(status), "{arguments}: {error}");
-        assert!(error.contains(says), "{arguments}: {error}");
-        assert!(
-            status == 2 || error.lines().count() == 1,
-            "{arguments}: {error}"
-        );
-        assert!(out.stdout.is_empty(), "{arguments}");
-    }
+    all_refused(folder.path(), "design", &cases);
     assert_eq!(
         fs::read_to_string(folder.path().join("kind.toml")).unwrap(),
         kind("accel", "gravity", true)

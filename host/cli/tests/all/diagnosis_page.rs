@@ -2,7 +2,6 @@
 
 use std::fmt::Write as _;
 use std::path::Path;
-use std::process::{Command, Output};
 
 use mimu::diagnose::diagnose;
 use mimu::diagnose::picture::Against;
@@ -15,6 +14,8 @@ use mimu_rig::located::Source;
 use mimu_rig::plan::Plan;
 use mimu_rig::rig_file::{RigFile, RigTruth};
 use serde_json::Value;
+
+use super::command::run;
 
 /// A name that would break a page without escaping.
 const DEVICE: &str = r#"<b>unit</b> & "7""#;
@@ -64,15 +65,6 @@ pub fn record(folder: &Path, name: &str, effect: &str, seed: u64) {
 
 pub fn cubic() -> String {
     format!("[[effect]]\nid = \"gyro_scale_cubic\"\ndps_at_300dps = {CUBIC_DPS:?}\n")
-}
-
-pub fn mimu(folder: &Path, arguments: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_mimu"));
-    command
-        .current_dir(folder)
-        .args(arguments)
-        .output()
-        .unwrap()
 }
 
 #[test]
@@ -188,13 +180,13 @@ fn numbers_of_the_page_are_those_of_the_json_and_are_read_in_its_units() {
     let folder = tempfile::tempdir().unwrap();
     record(folder.path(), "r", &cubic(), 1);
     record(folder.path(), "again", &cubic(), 2);
-    let out = mimu(
+    let out = run(
         folder.path(),
-        &[
+        [
             "diagnose", "r", "--verify", "again", "--page", "p.html", "--json", "p.json",
         ],
     );
-    assert!(out.status.success(), "{out:?}");
+    assert_eq!(out.status, Some(0), "{out:?}");
     let page = std::fs::read_to_string(folder.path().join("p.html")).unwrap();
     let json = std::fs::read_to_string(folder.path().join("p.json")).unwrap();
     let json: Value = serde_json::from_str(&json).unwrap();
@@ -287,8 +279,8 @@ fn numbers_of_the_page_are_those_of_the_json_and_are_read_in_its_units() {
 fn the_page_needs_nothing_else_and_escapes_names() {
     let folder = tempfile::tempdir().unwrap();
     record(folder.path(), "a & <b>", "", 1);
-    let out = mimu(folder.path(), &["diagnose", "a & <b>", "--page", "p.html"]);
-    assert!(out.status.success(), "{out:?}");
+    let out = run(folder.path(), ["diagnose", "a & <b>", "--page", "p.html"]);
+    assert_eq!(out.status, Some(0), "{out:?}");
     let page = std::fs::read_to_string(folder.path().join("p.html")).unwrap();
     let options = roxmltree::ParsingOptions {
         allow_dtd: true,

@@ -2,7 +2,8 @@
 
 use serde_json::Value;
 
-use super::diagnosis_page::{cubic, mimu, record};
+use super::command;
+use super::diagnosis_page::{cubic, record};
 
 /// Two effects that a diagnosis knows, and one that it does not.
 const FLAWED: &str = "[[effect]]\nid = \"gyro_g_sensitivity\"\nmatrix_dps_per_g = [[0.1, 0.0, 0.05], [0.0, -0.1, 0.0], [0.02, 0.0, 0.1]]\n\
@@ -13,9 +14,9 @@ const FLAWED: &str = "[[effect]]\nid = \"gyro_g_sensitivity\"\nmatrix_dps_per_g 
 fn a_diagnosis_of_an_effect_takes_at_most_25_lines_without_all() {
     let folder = tempfile::tempdir().unwrap();
     let run = |arguments: &[&str]| {
-        let out = mimu(folder.path(), arguments);
-        assert!(out.status.success(), "{out:?}");
-        let printed = String::from_utf8(out.stdout).unwrap();
+        let out = command::run(folder.path(), arguments);
+        assert_eq!(out.status, Some(0), "{out:?}");
+        let printed = out.stdout;
         let wide = printed.lines().find(|l| l.chars().count() > 100);
         assert_eq!(wide, None, "{arguments:?}");
         printed

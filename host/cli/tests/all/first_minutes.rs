@@ -45,7 +45,7 @@ fn a_log_becomes_a_header_in_two_commands_and_nothing_is_replaced_by_mistake() {
     let [one, other] = ["cal.h", "again.h"].map(|name| std::fs::read(at.join(name)).unwrap());
     assert_eq!(one, other);
     let out = mimu(at, "export c cal.toml --calibration cal.toml -o third.h");
-    assert_eq!(out.status.code(), Some(2));
+    assert_eq!(out.status, Some(2));
 
     // The recording was kept.
     let before = std::fs::read(at.join("cal.toml")).unwrap();
@@ -83,12 +83,11 @@ fn every_refusal_on_standard_output_is_json_with_its_judgement() {
     let at = folder.path();
     let of = |arguments: &str| {
         let out = mimu(at, arguments);
-        assert_eq!(out.status.code(), Some(1), "{arguments}");
-        let refusal = json(&String::from_utf8(out.stdout).unwrap());
+        assert_eq!(out.status, Some(1), "{arguments}");
+        let refusal = json(&out.stdout);
         assert_eq!(refusal["format"], "mimu-refusal/1", "{arguments}");
-        let line = String::from_utf8(out.stderr).unwrap();
         let problem = refusal["error"]["problem"].as_str().unwrap();
-        assert!(line.contains(problem), "{arguments}: {line}");
+        says(&out.stderr, &[problem]);
         refusal
     };
     let missing = of("import nowhere.csv -o x --json -");

@@ -1,50 +1,22 @@
 //! A calibration file can be applied by hand, with only the numbers in it.
 
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
-fn mimu(folder: &Path, arguments: &[&str]) -> String {
-    let out = Command::new(env!("CARGO_BIN_EXE_mimu"))
-        .current_dir(folder)
-        .args(arguments)
-        .output()
-        .unwrap();
-    assert!(
-        out.status.success(),
-        "mimu {arguments:?}: {}",
-        String::from_utf8_lossy(&out.stderr)
-    );
-    String::from_utf8(out.stdout).unwrap()
-}
+use super::command::{done, json};
 
 /// Imports and fits the small recording of the demo in `folder`; returns the JSON of the fit.
 fn fitted(folder: &Path) -> serde_json::Value {
     let demo = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../tests/example");
     let files = ["accel.txt", "gyro.txt"].map(|f| demo.join(f).to_str().unwrap().to_string());
-    let columns = ["t_s,accel_x,accel_y,accel_z", "t_s,gyro_x,gyro_y,gyro_z"];
-    mimu(
+    let columns = "--columns t_s,accel_x,accel_y,accel_z --columns t_s,gyro_x,gyro_y,gyro_z";
+    let [accel, gyro] = files;
+    done(
         folder,
-        &[
-            "import",
-            &files[0],
-            &files[1],
-            "--columns",
-            columns[0],
-            "--columns",
-            columns[1],
-            "--raw-unit",
-            "count",
-            "--reference",
-            "gravity",
-            "-o",
-            "recording",
-        ],
+        &format!(
+            "import {accel} {gyro} {columns} --raw-unit count --reference gravity -o recording"
+        ),
     );
-    let json = mimu(
-        folder,
-        &["fit", "recording", "-o", "cal.toml", "--json", "-"],
-    );
-    serde_json::from_str(&json).unwrap()
+    json(folder, "fit recording -o cal.toml")
 }
 
 /// The numbers between the brackets after `key`, read as by a person: without a TOML parser or project code.

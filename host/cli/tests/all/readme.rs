@@ -3,6 +3,8 @@
 use std::path::Path;
 use std::process::Command;
 
+use super::command::mimu;
+
 #[test]
 fn the_fit_in_the_readme_is_that_of_the_example() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
@@ -40,9 +42,7 @@ fn what_the_page_of_designs_shows_is_what_the_command_prints() {
             Some(typed) => typed.split_once('\n').unwrap().1,
             None => shown,
         };
-        let mut command = Command::new(env!("CARGO_BIN_EXE_mimu"));
-        let printed = command.args(arguments.split(' ')).output().unwrap().stdout;
-        let printed = String::from_utf8(printed).unwrap();
+        let printed = mimu(Path::new("."), arguments).stdout;
         assert!(
             printed.contains(shown),
             "docs/design.md shows for `mimu {arguments}`\n{shown}\nand it prints\n{printed}"

@@ -268,7 +268,6 @@ fn a_rest_ramp_upon_poses_at_room_temperature_halves_the_error_of_a_sweep_and_is
     }
 
     let refused = mimu(folder, "thermal fit sweep --base room.toml -o never.toml");
-    let told = String::from_utf8_lossy(&refused.stderr).into_owned();
-    assert!(told.contains("leave the base out (--base)"), "{told}");
+    refused.refused(&["leave the base out (--base)"]);
     assert!(!folder.join("never.toml").exists());
 }

@@ -1,14 +1,13 @@
 //! The command `mimu thermal plan`: the bench reads its output.
 
 use std::path::Path;
-use std::process::Output;
 
 use mimu_rig::plan::{Plan, Pose};
 use mimu_rig::table::{Table, TableTruth};
 
-use super::command;
+use super::command::{self, Ran, says};
 
-fn mimu(folder: &Path, arguments: &str) -> Output {
+fn mimu(folder: &Path, arguments: &str) -> Ran {
     command::mimu(folder, &format!("thermal plan {arguments}"))
 }
 
@@ -17,11 +16,7 @@ fn planned(folder: &Path, arguments: &str) -> (Plan, serde_json::Value) {
         folder,
         &format!("{arguments} -o plan.toml --json plan.json"),
     );
-    assert!(
-        out.status.success(),
-        "{}",
-        String::from_utf8_lossy(&out.stderr)
-    );
+    assert_eq!(out.status, Some(0), "{}", out.stderr);
     let json = std::fs::read(folder.join("plan.json")).unwrap();
     let plan = Plan::read(&folder.join("plan.toml")).unwrap();
     (plan, serde_json::from_slice(&json).unwrap())
@@ -68,17 +63,9 @@ fn nius_cycle_is_the_published_one() {
 fn people_read_what_is_refused_and_what_is_inseparable() {
     let folder = tempfile::tempdir().unwrap();
     let out = mimu(folder.path(), "--procedure ramp --range 20..35");
-    let error = String::from_utf8(out.stderr).unwrap();
-    assert!(
-        out.status.code() == Some(1) && error.contains("needs 20 K"),
-        "{error}"
-    );
+    out.refused(&["needs 20 K"]);
     let out = mimu(folder.path(), "--procedure rest-ramp --range 0..50");
-    let text = String::from_utf8(out.stdout).unwrap();
-    assert!(
-        text.contains("inseparable: ") && text.contains("not determined"),
-        "{text}"
-    );
+    says(&out.stdout, &["inseparable: ", "not determined"]);
 }
 
 #[test]
@@ -107,7 +94,7 @@ fn a_course_and_a_soak_both_ways_reach_the_plan() {
     );
     assert_eq!(plan.rounds, 22);
     let refused = mimu(folder.path(), "--procedure soak --course 25,-35:30");
-    assert_eq!(refused.status.code(), Some(1));
+    assert_eq!(refused.status, Some(1));
     let usage = mimu(folder.path(), "--procedure niu --course warm");
-    assert_eq!(usage.status.code(), Some(2));
+    assert_eq!(usage.status, Some(2));
 }

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::process::{Child, Output, Stdio};
+use std::process::{Child, Output};
 use std::time::{Duration, Instant};
 
 use mimu::calibration::Calibration;
@@ -13,6 +13,7 @@ use mimu_rig::plan::Plan;
 use mimu_rig::rig_file::RigTruth;
 use serde_json::Value;
 
+use crate::command::mimu;
 use crate::wizard::bench::{Bench, unit};
 use crate::wizard::on_board::errors;
 
@@ -112,7 +113,7 @@ fn by_the_bench(plan: &str, truth: &RigTruth) -> Inputs {
 }
 
 #[test]
-#[ignore = "nightly: minutes of the emulated board; by day `device::thermal_record` records every input"]
+#[ignore = "nightly: minutes of the emulated board; by day `host/equipment` carries out sequences"]
 fn a_plan_is_carried_out_and_its_recording_has_the_inputs_of_the_bench_and_is_fitted() {
     let bench = Bench::new("table", brisk(11), 11);
     let plan = sweep();
@@ -189,7 +190,7 @@ fn recording(bench: &Bench, name: &str, bytes: u64, child: &mut Child) {
 }
 
 #[test]
-#[ignore = "nightly: the emulated board; by day `device::thermal_record` interrupts one with a scripted device"]
+#[ignore = "nightly: the emulated board; by day `host/equipment` ends with the chamber safe"]
 fn a_procedure_that_is_interrupted_or_loses_its_power_keeps_what_it_has_and_leaves_the_chamber_safe()
  {
     let mut bench = Bench::new("table", brisk(12), 12);
@@ -273,18 +274,7 @@ fn what_cannot_be_carried_out_is_refused_in_a_line_before_anything_is_opened() {
         ),
         ("nowhere.toml -o rec", "nowhere.toml"),
     ] {
-        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_mimu"));
-        let command = command
-            .current_dir(folder.path())
-            .args(["thermal", "record"]);
-        let out = command
-            .args(arguments.split(' '))
-            .stdin(Stdio::null())
-            .output()
-            .unwrap();
-        let line = String::from_utf8(out.stderr).unwrap();
-        assert_eq!(out.status.code(), Some(1), "{line}");
-        assert!(line.contains(words), "{arguments}: {line}");
+        mimu(folder.path(), &format!("thermal record {arguments}")).refused(&[words]);
         assert!(!path("rec").exists());
     }
 }

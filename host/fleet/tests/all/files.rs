@@ -2,7 +2,6 @@
 
 use std::fs;
 use std::path::Path;
-use std::time::Instant;
 
 use mimu::calibration::Calibration;
 use mimu::data_sheet::Part;
@@ -12,7 +11,7 @@ use mimu_fleet::labels::LabelTable;
 use mimu_fleet::tree::{Measurement, Search, Tree};
 use mimu_fleet::{Options, fleet};
 
-use crate::plant::{Plant, processor_time};
+use crate::plant::Plant;
 
 /// A file with the parameters of `measurement`.
 pub fn file(measurement: &Measurement) -> String {
@@ -237,22 +236,4 @@ fn capability_is_that_of_the_values_in_the_files() {
         found.beyond,
         values.iter().filter(|v| v.abs() > 0.5).count()
     );
-}
-
-#[test]
-#[ignore = "nightly: writes 10,000 files"]
-fn ten_thousand_files_are_read_in_seconds() {
-    let folder = tempfile::tempdir().unwrap();
-    for one in &Plant::new(10_000, 4).tree().measurements {
-        write(&folder.path().join(&one.file), &file(one));
-    }
-    let (begun, time) = (Instant::now(), processor_time());
-    let tree = read(folder.path(), None, None);
-    let [read, elapsed] = [processor_time() - time, begun.elapsed().as_secs_f64()];
-    let result = fleet(tree, None, &Options::default()).unwrap();
-    let [all, to_the_end] = [processor_time() - time, begun.elapsed().as_secs_f64()];
-    println!(
-        "10,000 files: {read:.1} s of processor time to read, {all:.1} s in all; {elapsed:.1} and {to_the_end:.1} s elapsed"
-    );
-    assert_eq!(result.units, 10_000);
 }

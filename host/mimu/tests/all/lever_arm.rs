@@ -7,6 +7,7 @@ use mimu::warning::Warning;
 use mimu::{
     Calibration, Fit, Manifest, Options, Prepared, RawUnit, Reference, Samples, fit, verify,
 };
+use mimu_rig::random::Random;
 
 const G: f64 = 9.8;
 const RATE_HZ: f64 = 50.0;
@@ -23,16 +24,7 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
 
 /// Dwells of two seconds: all faces turned in both directions at 250 deg/s, and corners at rest. `arm`: from the axis to the sensor, m.
 fn recording(arm: [f64; 3], seed: u64) -> Samples {
-    let mut state = seed;
-    let mut noise = || {
-        let mut uniform = || {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            (state >> 11) as f64 / (1_u64 << 53) as f64
-        };
-        (0..12).map(|_| uniform()).sum::<f64>() - 6.0
-    };
+    let mut random = Random::new(seed, "lever arm");
     let mut steps = Vec::new();
     for axis in 0..3 {
         for sign in [1.0, -1.0] {
@@ -57,8 +49,8 @@ fn recording(arm: [f64; 3], seed: u64) -> Samples {
             samples.step.push(number);
             samples.temp_c.push(25.0);
             for i in 0..3 {
-                samples.raw[i].push(rate[i] + 2e-3 * noise());
-                samples.raw[3 + i].push(dot(MATRIX[i], force) + BIAS[i] + 0.02 * noise());
+                samples.raw[i].push(rate[i] + 2e-3 * random.normal());
+                samples.raw[3 + i].push(dot(MATRIX[i], force) + BIAS[i] + 0.02 * random.normal());
                 samples.reference[i].push(up[i] * rate_dps);
                 samples.reference[3 + i].push(G * up[i]);
             }

@@ -6,25 +6,10 @@ use mimu::quantity::Sensor;
 use mimu::signal::dwell::Fault;
 use mimu::signal::stillness::STILL_FACTOR;
 use mimu::{Fit, Manifest, Options, Prepared, RawUnit, Reference, Samples, fit};
+use mimu_rig::random::Random;
 
 const G: f64 = 9.8;
 const RATE_HZ: f64 = 100.0;
-
-/// Standard normal numbers.
-struct Noise(u64);
-
-impl Noise {
-    fn next(&mut self) -> f64 {
-        // The sum of twelve uniform numbers has a variance of one.
-        let uniform = |state: &mut u64| {
-            *state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            (*state >> 11) as f64 / (1u64 << 53) as f64
-        };
-        (0..12).map(|_| uniform(&mut self.0)).sum::<f64>() - 6.0
-    }
-}
 
 /// A unit whose readings are `matrix · input + bias`, some milliseconds later.
 struct Unit {
@@ -94,7 +79,7 @@ fn none(_: [[f64; 3]; 2]) -> [f64; 3] {
 /// Six faces at rest, 3 s each, then two turns of 10 s about each axis. The reference is `pace` times as fast as the truth.
 fn recorded(turn: Turn, error: Error, pace: f64, seed: u64) -> Prepared {
     let mut samples = Samples::default();
-    let mut noise = Noise(seed);
+    let mut noise = Random::new(seed, "moving input");
     let mut add = |step: i32, count: usize, at: &dyn Fn(f64) -> [[f64; 3]; 2]| {
         for k in 0..count {
             let t = k as f64 / RATE_HZ;
@@ -104,7 +89,7 @@ fn recorded(turn: Turn, error: Error, pace: f64, seed: u64) -> Prepared {
             for (s, unit) in [&GYRO, &ACCEL].into_iter().enumerate() {
                 for axis in 0..3 {
                     let truth = at(t - unit.delay[axis]);
-                    let mut reading = unit.bias[axis] + unit.sigma * noise.next();
+                    let mut reading = unit.bias[axis] + unit.sigma * noise.normal();
                     for (p, x) in unit.matrix[axis].iter().zip(truth[s]) {
                         reading += p * x;
                     }

@@ -24,8 +24,6 @@ use super::power::calibration;
 /// If no answer comes, the test fails and does not hang.
 const PATIENCE: Duration = Duration::from_secs(300);
 const G: f64 = 9.793;
-/// More than the sum of all errors of the table: mounting 39 arcseconds, the rest below 20.
-const TABLE: f64 = 60.0 / 206_265.0;
 
 fn commanded(carrier: &str) -> Board {
     let text = format!(
@@ -99,15 +97,6 @@ impl Client {
         let number = |word: &str| word.parse().unwrap_or_else(|_| panic!("{answer}"));
         answer.split(' ').map(number).collect()
     }
-
-    /// Waits until a command is done. Both lines are sent at once, so that they are answered at one time.
-    fn carry_out(&mut self, line: &str) {
-        assert_eq!(self.ask(&format!("{line}\nBUSY?")), "OK", "{line}");
-        let mut busy = String::new();
-        self.stream.read_line(&mut busy).unwrap();
-        assert_eq!(busy, "1\n", "{line}");
-        while self.ask("BUSY?") == "1" {}
-    }
 }
 
 fn open(path: impl AsRef<Path>) -> File {
@@ -164,69 +153,6 @@ fn commands_are_answered_while_the_bench_stands_still_because_nobody_reads_the_p
         assert_eq!(client.ask("LINK?"), "1", "the others go on");
     });
     assert_eq!(served.traffic().delivered, 0);
-}
-
-#[test]
-#[ignore = "nightly: by day rig's own tests of commands"]
-fn a_table_goes_where_it_is_told_and_turns_as_fast_as_it_is_told() {
-    let served = Served::new(commanded("table"), Pace::Fast, None).unwrap();
-    serve(served, |client| {
-        // Without a supply the firmware takes no computing time.
-        client.tell("POWER OFF");
-        let _port = open(client.ask("PORT?"));
-        client.carry_out("MOVE 2 0 0");
-        let truth = client.numbers("TRUTH?");
-        for (f, wanted) in truth[3..].iter().zip([G, 0.0, 0.0]) {
-            assert!((f - wanted).abs() < G * TABLE, "{truth:?}");
-        }
-        assert_eq!(client.ask("POSITION?"), "1 0 0 0");
-
-        // Right-hand rule: about the body's z, then about the tilt axis, which is then along x.
-        client.carry_out("TURN inner -90 45");
-        assert_eq!(client.ask("POSITION?"), "0 1 0 0");
-        client.carry_out("TURN middle -90 45");
-        assert_eq!(client.ask("POSITION?"), "0 0 1 0");
-        assert!(client.refusal("TURN inner 90 500").contains("400"));
-        assert!(client.refusal("TURN up 90 5").contains("not an axis"));
-        client.carry_out("MOVE 1 0 0");
-
-        client.carry_out("RATE 90");
-        assert!(
-            client
-                .refusal("TURN inner 90 5")
-                .contains("starts from rest")
-        );
-        let truth = client.numbers("TRUTH?");
-        // The Earth adds 0.004 deg/s at most.
-        for (rate, wanted) in truth.iter().zip([90.0, 0.0, 0.0]) {
-            assert!((rate - wanted).abs() < 0.005 + 90.0 * TABLE, "{truth:?}");
-        }
-        assert!(client.refusal("RATE 500").contains("400"));
-        assert!(client.refusal("FIDGET 3").contains("table"));
-
-        // An open interlock stops the motion, and nothing moves until it is closed.
-        client.carry_out("INTERLOCK 0");
-        let rate = client.numbers("TRUTH?");
-        assert!(rate[..3].iter().all(|x| x.abs() < 0.01), "{rate:?}");
-        for line in ["MOVE 0 0 1", "RATE 1", "SPIN 1", "TURN inner 1 1"] {
-            assert!(client.refusal(line).contains("interlock"), "{line}");
-        }
-        client.tell("STOP");
-
-        client.tell("CHAMBER 40");
-        assert_eq!(client.ask("CHAMBER?"), "40");
-        let before = client.numbers("TIME?")[0];
-        client.tell("CHAMBER 10 60");
-        let c = loop {
-            let c = client.numbers("CHAMBER?")[0];
-            if c < 30.0 {
-                break c;
-            }
-        };
-        // A rate of 1 K/s; both commands are processed in one poll, at one time of the clock.
-        let after = client.numbers("TIME?")[0];
-        assert!(c == 10.0 || after - before >= 40.0 - c, "{c} °C");
-    });
 }
 
 /// A program that has the port open.

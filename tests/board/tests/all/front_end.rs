@@ -2,15 +2,13 @@
 //! written out here.
 
 use mimu_board::flash::SECTOR;
-use mimu_board::front::Front;
-use mimu_board::schematic::{DIVIDER_RATIO, Net, Volts, WIRING};
 use mimu_board_tests::conversation::{Answer, Conversation};
 use mimu_board_tests::{MS, STARTED, still};
 use mimu_core::stored::hash;
-use mimu_core::wire::{Request, flags};
+use mimu_core::wire::Request;
 
 use super::power::calibration;
-use super::serial::{STREAM, at_rest};
+use super::serial::at_rest;
 
 /// Registers of ADC1 (RM0433 25.6): calibration factors of the offset and of the linearity.
 const CALFACT: u64 = 0x4002_20c4;
@@ -22,7 +20,6 @@ const KEPT: std::ops::Range<usize> = SLOT + 32..SLOT + 96;
 
 /// Bits for the stored quantities.
 const CONVERTER: u32 = 1;
-const PINS: u32 = 2;
 
 fn stores(device: &mut Conversation, bytes: &[u8]) {
     device.upload(bytes);
@@ -87,53 +84,4 @@ fn the_converter_goes_on_with_the_factors_that_were_kept_with_the_calibration() 
     assert_eq!(powered_again(&mut device, Some(&words)), Some(hash(&bytes)));
     device.run_for(STARTED);
     assert_eq!(device.board.register(CALFACT).unwrap(), 0);
-}
-
-/// A unit at rest at this temperature. Its gyros' TEMP pins differ: they are 6, -1 and -5 °C from their mean.
-fn at(temp_c: f64) -> Volts {
-    let mut volts = at_rest(3.3);
-    for (axis, apart_c) in [6.0, -1.0, -5.0].into_iter().enumerate() {
-        let (_, _, input) = wire(axis);
-        volts.input[input] = (2.5 + 0.0084 * (temp_c + apart_c - 25.0)) * DIVIDER_RATIO;
-    }
-    volts
-}
-
-fn wire(axis: usize) -> (Net, &'static str, usize) {
-    let found = WIRING
-        .iter()
-        .find(|(net, ..)| *net == Net::Temperature(axis));
-    *found.expect("it is wired")
-}
-
-#[test]
-fn a_temperature_pin_that_is_open_at_power_on_moves_the_temperature_by_nothing() {
-    let mut device = Conversation::new(still(at(30.0)));
-    device.greeting();
-    // The offsets are determined over ten seconds.
-    device.run_for(STARTED + 10_100 * MS);
-    stores(&mut device, &calibration(2, 3.5));
-    let kept = &device.board.store().unwrap()[KEPT];
-    assert_eq!(
-        u32::from_le_bytes(kept[..4].try_into().unwrap()),
-        CONVERTER | PINS
-    );
-    for (at, apart_c) in [(32, 6.0_f32), (36, -1.0), (40, -5.0)] {
-        let found = f32::from_le_bytes(kept[at..at + 4].try_into().unwrap());
-        assert!((found - apart_c).abs() < 0.1, "{found}");
-    }
-    // Later it is warmer, and the first pin is open. Without the stored offsets, the mean would change by -3 °C.
-    let mut open = at(40.0);
-    open.input[wire(0).2] = 0.0;
-    device.board.set_front(Front::Still(open)).unwrap();
-    powered_again(&mut device, None);
-    device.run_for(STARTED);
-    assert_eq!(device.ask(STREAM), Answer::Done);
-    device.run_for(1000 * MS);
-    let (head, _) = device.last.expect("a batch");
-    assert_eq!(
-        head.flags & flags::TEMPERATURE_LEFT_OUT[0],
-        flags::TEMPERATURE_LEFT_OUT[0]
-    );
-    assert!((head.temp_c - 40.0).abs() < 0.2, "{}", head.temp_c);
 }

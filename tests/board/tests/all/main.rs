@@ -9,4 +9,3 @@ mod power;
 mod restart;
 mod serial;
 mod terminal;
-mod traces;

@@ -3,20 +3,11 @@
 //! The accelerometer's z axis is a clock: 4 g/s, so each sample says when it was taken by the board's crystal, to 30 µs and the 100 µs within which
 //! the bench brings the sensor up to date. Nothing of the firmware takes part in this evaluation.
 
-use std::collections::BTreeMap;
-
 use mimu_board::inertial::{Feed, Sensed};
 use mimu_board::running::Board;
 use mimu_board_tests::conversation::{Answer, Conversation, Sample};
 use mimu_board_tests::{MS, digital_image};
-use mimu_core::PerSensor;
-use mimu_core::compensation::{Affine, Compensation, Sample as SiSample};
-use mimu_core::effects::DeviceEffect;
-use mimu_core::single;
-use mimu_core::stored::{Curves, MAX_LENGTH, Origin, RawUnit, Setting, decode, encode};
-use mimu_core::table::Node;
-use mimu_core::wire::{BatchHead, Request, Verdict, flags, reading};
-use nalgebra::{Matrix3, Vector3};
+use mimu_core::wire::{Request, Verdict, flags};
 
 /// The clock on the z axis, g/s, and its first value, g.
 const CLOCK: [f64; 2] = [4.0, -15.5];
@@ -269,92 +260,5 @@ fn after_a_reset_the_readings_are_again_those_of_the_present() {
         let mut pairs = device.samples.windows(2);
         let standing = pairs.find(|p| p[0].counts.accel[2] == p[1].counts.accel[2]);
         assert!(standing.is_none(), "reset {k}: {standing:?}");
-    }
-}
-
-/// A calibration of counts at one temperature, as the device stores it: the inverse of a unit within the data sheet's limits.
-fn calibration(effects: &[DeviceEffect<f32>], settings: Option<PerSensor<Setting>>) -> Vec<u8> {
-    let affine = |per_si: f32, shear: f32, bias: f32| {
-        let matrix = Matrix3::new(1.0, shear, 0.0, -shear, 1.01, 0.02, 0.0, 0.01, 0.99) / per_si;
-        let offset = -(matrix * Vector3::new(bias, -0.5 * bias, 0.25 * bias));
-        Affine { matrix, offset }
-    };
-    let model = Compensation {
-        gyro: affine(7510.0, 0.01, 60.0),
-        accel: affine(835.35, -0.02, 120.0),
-    };
-    let origin = Origin {
-        raw_unit: Some(RawUnit::Count),
-        settings,
-        ..Origin::UNKNOWN
-    };
-    let matrices = model.as_ref().map(|model| &model.matrix);
-    let nodes = [Node::constant(25.0, model)];
-    let mut bytes = [0; MAX_LENGTH];
-    let length = encode(&origin, matrices, &Curves::of(&nodes), effects, &mut bytes).unwrap();
-    bytes[..length].to_vec()
-}
-
-#[test]
-#[ignore = "nightly: by day `mimu device check` compares the same stream"]
-fn the_compensated_stream_is_that_of_the_counts_and_of_the_crystal_s_rate() {
-    // The size effect takes the angular acceleration, a difference times the sample rate.
-    let size = DeviceEffect::named("accel_size_effect", &[0.01; 9], None).unwrap();
-    for (effects, crystal) in [(&[][..], 1.0), (&[size][..], 1.03)] {
-        let bytes = calibration(effects, None);
-        let mut device = streaming(feed(), crystal);
-        device.upload(&bytes);
-        assert_eq!(device.ask(Request::UploadCommit), Answer::Done);
-        device.run_for(1_000 * MS);
-        device.samples.clear();
-        let both = Request::Stream {
-            raw: true,
-            compensated: true,
-        };
-        assert_eq!(device.ask(both), Answer::Done);
-        device.run_for(2_000 * MS);
-        let stored = decode(&bytes).unwrap();
-        let model = stored.compensator.table.state().model;
-        let mut state = stored.compensator.state(1000.0);
-        let mut compared = 0;
-        let raw: BTreeMap<u32, Sample> = device.samples.iter().map(|s| (s.number, *s)).collect();
-        for (number, si) in &device.compensated {
-            let Some(raw) = raw.get(number) else { continue };
-            let read = reading(&raw.counts, &PerSensor::both(1.0));
-            // Written out in double precision.
-            let exact = |affine: &Affine<f32>, u: &Vector3<f32>| {
-                affine.matrix.map(f64::from) * u.map(f64::from) + affine.offset.map(f64::from)
-            };
-            let (rate, force) = (
-                exact(&model.gyro, &read.gyro),
-                exact(&model.accel, &read.accel),
-            );
-            let off = (si.gyro.map(f64::from) - rate).amax();
-            assert!(off < 1e-4, "{number}: {off}");
-            if effects.is_empty() {
-                let off = (si.accel.map(f64::from) - force).amax();
-                assert!(off < 1e-3, "{number}: {off}");
-            }
-            let head = BatchHead {
-                first: *number,
-                tick_us: 0,
-                period_ns: raw.period_ns,
-                samples_lost: 0,
-                batches_dropped: 0,
-                temp_c: 25.0,
-                flags: 0,
-            };
-            state.at_rate(head.rate_hz() as f32);
-            compared += 1;
-            let here = single::apply(&stored.compensator, &mut state, &read);
-            let bits = |of: &SiSample<f32>| [of.gyro, of.accel].map(|v| v.map(f32::to_bits));
-            // A few samples settle what each correction takes from the one before.
-            assert!(
-                compared < 16 || bits(&here) == bits(si),
-                "{number}: {here:?} {si:?}"
-            );
-        }
-        assert!(compared > 1_500, "{compared}");
-        println!("crystal {crystal}: {compared} samples equal to the last bit");
     }
 }

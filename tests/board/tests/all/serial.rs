@@ -1,15 +1,8 @@
 //! The device behind its serial line: its identity and its samples.
-
-use std::path::Path;
-
-use mimu_board::front::Front;
-use mimu_board::running::Board;
 use mimu_board::schematic::{DIVIDER_RATIO, Net, Volts, WIRING};
-use mimu_board_tests::conversation::{Answer, Conversation, Sample, Tested};
-use mimu_board_tests::{MS, STARTED, image, still};
-use mimu_core::wire::{Request, Verdict, flags};
-use mimu_rig::plan::Plan;
-use mimu_rig::rig_file::{RigFile, RigTruth};
+use mimu_board_tests::conversation::{Answer, Conversation, Sample};
+use mimu_board_tests::{MS, STARTED, still};
+use mimu_core::wire::Request;
 
 pub const STREAM: Request<'_> = Request::Stream {
     raw: true,
@@ -104,42 +97,6 @@ fn the_raw_stream_holds_the_voltages_of_the_pins() {
     }
 }
 
-fn self_test(device: &mut Conversation) -> Vec<Tested> {
-    match device.ask(Request::SelfTest) {
-        Answer::SelfTest(result) => result,
-        other => panic!("{other:?}"),
-    }
-}
-
-/// Names of the rows that fail.
-fn failed(result: &[Tested]) -> Vec<&str> {
-    let of = result.iter().filter(|row| row.verdict == Verdict::Failed);
-    of.map(|row| row.name.as_str()).collect()
-}
-
-fn value(result: &[Tested], name: &str) -> f32 {
-    result.iter().find(|row| row.name == name).unwrap().value
-}
-
-#[test]
-fn a_unit_of_the_usual_parts_that_lies_still_passes_the_self_test() {
-    let plan = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../rig/plans/rest.toml");
-    let plan = Plan::read(&plan).unwrap();
-    let truth = RigTruth::resolve(&RigFile::default(), 7).unwrap();
-    let front = Front::bench(&plan, &truth, 7).unwrap();
-    let mut device = Conversation::new(Board::new(&image(), front).unwrap());
-    device.greeting();
-    device.run_for(STARTED);
-    let result = self_test(&mut device);
-    assert_eq!((failed(&result).len(), result.len()), (0, 15), "{result:?}");
-    // Without sensors nothing responds to the self-test; the converter still has its supply.
-    device.board.set_front(Front::Still(Volts::GROUND)).unwrap();
-    let result = self_test(&mut device);
-    let passed = result.iter().filter(|row| row.verdict != Verdict::Failed);
-    let passed: Vec<&str> = passed.map(|row| row.name.as_str()).collect();
-    assert_eq!(passed, ["supply"], "{result:?}");
-}
-
 /// Pins of a unit at rest and 25 °C, with the converter's supply at `rail`, V.
 pub fn at_rest(rail: f64) -> Volts {
     let mut volts = Volts {
@@ -154,82 +111,6 @@ pub fn at_rest(rail: f64) -> Volts {
         };
     }
     volts
-}
-
-#[test]
-#[ignore = "nightly: by day the firmware's own tests of each row"]
-fn the_self_test_tells_a_supply_a_reference_and_a_temperature_by_name() {
-    let input = |net| {
-        let wire = WIRING.iter().find(|(of, ..)| *of == net);
-        wire.expect("it is wired").2
-    };
-    let mut device = Conversation::new(still(at_rest(3.3)));
-    device.greeting();
-    device.run_for(STARTED);
-    let mut seen = |volts: Volts| {
-        device.board.set_front(Front::Still(volts)).unwrap();
-        let result = self_test(&mut device);
-        let supplies = ["temperature", "reference", "supply"];
-        let failed = failed(&result).into_iter();
-        // Fixed voltages do not respond to the self-test inputs.
-        let failed = failed.filter(|name| supplies.iter().any(|of| name.starts_with(of)));
-        let failed: Vec<String> = failed.map(str::to_owned).collect();
-        (failed, result)
-    };
-    let (found, result) = seen(at_rest(3.3));
-    assert!(found.is_empty(), "{result:?}");
-    assert!((value(&result, "supply") - 3.3).abs() < 2e-3);
-    assert!((value(&result, "reference") - 2.5).abs() < 2e-3);
-    // A regulator that is 0.3 V low; relative to it, the gyros' reference is right.
-    let (found, result) = seen(at_rest(3.0));
-    assert_eq!(found, ["supply"], "{result:?}");
-    assert!((value(&result, "supply") - 3.0).abs() < 2e-3, "{result:?}");
-    let mut volts = at_rest(3.3);
-    volts.input[input(Net::Reference(0))] = 2.35 * DIVIDER_RATIO;
-    let (found, result) = seen(volts);
-    // Temperatures are fractions of it: all of them step by 19 °C, which dies cannot.
-    let expected = [
-        "temperature x",
-        "temperature y",
-        "temperature z",
-        "reference",
-    ];
-    assert_eq!(found, expected, "{result:?}");
-    let mut volts = at_rest(3.3);
-    volts.input[input(Net::Temperature(1))] = 0.0;
-    let (found, result) = seen(volts);
-    assert_eq!(found, ["temperature y"], "{result:?}");
-}
-
-#[test]
-fn an_open_temperature_pin_is_flagged_within_two_batches_and_leaves_the_temperature_alone() {
-    let mut device = Conversation::new(still(at_rest(3.3)));
-    device.greeting();
-    device.run_for(STARTED);
-    assert_eq!(device.ask(STREAM), Answer::Done);
-    device.run_for(100 * MS);
-    let (head, temps_c) = device.last.unwrap();
-    assert_eq!(head.flags, 0);
-    assert!(
-        temps_c.iter().all(|c| (c - 25.0).abs() < 0.1),
-        "{temps_c:?}"
-    );
-    let (_, _, open) = WIRING[7];
-    for volts in [0.0, 5.0 * DIVIDER_RATIO] {
-        let mut pins = at_rest(3.3);
-        pins.input[open] = volts;
-        device.board.set_front(Front::Still(pins)).unwrap();
-        device.run_for(60 * MS);
-        for _ in 0..20 {
-            device.run_for(100 * MS);
-            let (head, _) = device.last.unwrap();
-            assert_eq!(head.flags, flags::TEMPERATURE_LEFT_OUT[1]);
-            assert!((head.temp_c - 25.0).abs() < 0.1, "{}", head.temp_c);
-        }
-    }
-    // The reading itself is still sent: 5 V are 25 + 2.5 / 0.0084 °C, minus the 14 % that the filter lacks after two seconds.
-    let (_, [x, y, z]) = device.last.unwrap();
-    assert!(y > 200.0 && (x - 25.0).abs() < 0.1 && (z - 25.0).abs() < 0.1);
 }
 
 #[test]

@@ -1,9 +1,5 @@
 //! The emulated board behind its pseudo-terminal, as seen by a program that opens serial ports.
-
-use std::fs::File;
-use std::io::{Read, Write};
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use mimu_board::front::Front;
@@ -11,63 +7,8 @@ use mimu_board::running::{Board, STORE};
 use mimu_board::schematic::Volts;
 use mimu_board::serve::{Pace, Served};
 use mimu_board_tests::{MS, STARTED, image, still};
-use mimu_core::wire::{Call, Decoder, MAX_FRAME, Message, Request, encode};
 use mimu_rig::plan::Plan;
 use mimu_rig::rig_file::{RigFile, RigTruth};
-
-/// If the device never answers, the test fails and does not hang.
-const PATIENCE: Duration = Duration::from_secs(300);
-
-#[test]
-fn a_call_through_the_terminal_is_answered_and_no_byte_is_lost() {
-    let mut served = Served::new(still(Volts::GROUND), Pace::Fast, None).unwrap();
-    let path = served.path().to_owned();
-    // No program has it open: time stands still.
-    for _ in 0..3 {
-        served.step().unwrap();
-    }
-    assert_eq!(served.board().state().ns, 0);
-
-    let port = File::options().read(true).write(true).open(path).unwrap();
-    let done = AtomicBool::new(false);
-    let traffic = std::thread::scope(|scope| {
-        let serving = scope.spawn(|| {
-            let began = Instant::now();
-            while !done.load(Ordering::Relaxed) {
-                assert!(began.elapsed() < PATIENCE, "no answer");
-                served.step().unwrap();
-            }
-            served.traffic()
-        });
-        let mut decoder = Decoder::new();
-        let mut greeting_of = |wanted: u16| {
-            let mut byte = [0];
-            loop {
-                (&port).read_exact(&mut byte).unwrap();
-                let frame = decoder.push(byte[0]);
-                if let Some(Message::Greeting { id, .. }) = frame.and_then(|f| f.message()) {
-                    assert_eq!(id, wanted);
-                    return;
-                }
-            }
-        };
-        // The device's own greeting shows that it listens.
-        greeting_of(0);
-        let mut frame = [0; MAX_FRAME];
-        let call = Call {
-            id: 7,
-            request: Request::Hello,
-        };
-        let length = encode(&call, &mut frame).unwrap();
-        (&port).write_all(&frame[..length]).unwrap();
-        greeting_of(7);
-        done.store(true, Ordering::Relaxed);
-        let traffic = serving.join().unwrap();
-        assert_eq!(traffic.sent, length as u64);
-        traffic
-    });
-    assert_eq!((traffic.lost, traffic.unheard), (0, 0));
-}
 
 #[test]
 fn what_is_in_the_file_is_in_the_flash_and_a_wrong_file_is_refused() {

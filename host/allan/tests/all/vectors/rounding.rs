@@ -69,32 +69,9 @@ fn long(mut rate: impl FnMut(usize) -> f64) -> Vec<i64> {
 }
 
 #[test]
-fn gravity_under_the_noise_of_a_short_series_costs_no_digits() {
-    let mut random = Random(4);
-    let steps: Vec<i64> = (0..ALL_TERMS)
-        .map(|_| whole(9.8 + 1e-4 * random.normal()))
-        .collect();
-    let spacing = Spacing::Samples(vec![1, 10, 1000, 100_000]);
-    for kind in KINDS {
-        for point in curve(&rates(&steps), 1.0, kind, &spacing, 0.95).expect("finite") {
-            let error = point.deviation / exact(&steps, kind, &point) - 1.0;
-            assert!(error.abs() < 1e-11, "{kind:?} {}: {error:.1e}", point.m);
-        }
-    }
-}
-
-#[test]
 fn gravity_under_the_noise_of_a_long_series_costs_less_than_one_in_1e9() {
     let mut random = Random(5);
     let steps = long(|_| 9.8 + 1e-3 * random.normal());
-    let worst = worst(&steps);
-    assert!(worst.iter().all(|&error| error < 1e-9), "{worst:?}");
-}
-
-#[test]
-fn a_drift_through_a_thousand_sigma_costs_no_more() {
-    let mut random = Random(6);
-    let steps = long(|i| 9.8 + 1e-3 * random.normal() + 5e-7 * i as f64);
     let worst = worst(&steps);
     assert!(worst.iter().all(|&error| error < 1e-9), "{worst:?}");
 }

@@ -1,12 +1,12 @@
 //! Runs the command, and checks its answer.
 
 use std::fs;
-use std::path::PathBuf;
-use std::process::Command;
+use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
 use super::generator::*;
+use crate::command::{Ran, run};
 
 /// Result of the command.
 pub struct Run {
@@ -16,15 +16,15 @@ pub struct Run {
 }
 
 pub fn mimu<S: AsRef<std::ffi::OsStr>>(arguments: impl IntoIterator<Item = S>) -> Run {
-    let output = Command::new(env!("CARGO_BIN_EXE_mimu"))
-        .args(arguments)
-        .output()
-        .unwrap();
-    let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("output is UTF-8");
+    let Ran {
+        status,
+        stdout,
+        stderr,
+    } = run(Path::new("."), arguments);
     Run {
-        status: output.status.code(),
-        stdout: text(output.stdout),
-        stderr: text(output.stderr),
+        status,
+        stdout,
+        stderr,
     }
 }
 

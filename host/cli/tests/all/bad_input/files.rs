@@ -95,32 +95,6 @@ fn a_pipe_is_written_to_and_not_replaced() {
 }
 
 #[test]
-fn wrong_usage_has_status_2() {
-    let place = Place::with(&by_hand());
-    let recording = place.text("rec");
-    for arguments in [
-        &["--holdout", "blocks=1"][..],
-        &["--holdout", "blocks=1000000000000"],
-        &["--holdout", "blocks=99999999999999999999999"],
-        &["--holdout", "four"],
-        &["--still", "0"],
-        &["--still", "nan"],
-        &["--still", "-3"],
-        &["--method", "guess"],
-        &["--unknown"],
-    ] {
-        let run = mimu(
-            ["fit", &recording]
-                .into_iter()
-                .chain(arguments.iter().copied()),
-        );
-        assert_eq!(run.status, Some(2), "{arguments:?}: {}", run.stderr);
-        assert!(run.stdout.is_empty(), "{arguments:?}");
-    }
-    assert_eq!(mimu([""; 0]).status, Some(2));
-}
-
-#[test]
 fn a_damaged_calibration_file_is_refused_with_its_place() {
     let place = Place::with(&by_hand());
     let path = place.text("cal.toml");

@@ -11,7 +11,6 @@ mod matek;
 mod peer;
 mod ports;
 mod recording;
-mod station;
 mod temperature;
 pub(crate) mod terminal;
 mod thermal_record;
@@ -19,7 +18,7 @@ mod thermal_record;
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 
-use serde_json::Value;
+use crate::command::Ran;
 
 /// A folder for the files of a test.
 struct Place(tempfile::TempDir);
@@ -41,58 +40,16 @@ impl Place {
     }
 }
 
-/// Result of the command.
-struct Ran {
-    status: Option<i32>,
-    stdout: String,
-    stderr: String,
-}
-
 fn command(place: &Place, arguments: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_mimu"));
-    command.current_dir(place.0.path()).args(arguments);
-    command.stdin(Stdio::null());
-    command
+    crate::command::command(place.0.path(), arguments)
 }
 
 fn mimu(place: &Place, arguments: &[&str]) -> Ran {
-    let out = command(place, arguments).output().unwrap();
-    Ran {
-        status: out.status.code(),
-        stdout: String::from_utf8(out.stdout).unwrap(),
-        stderr: String::from_utf8(out.stderr).unwrap(),
-    }
+    crate::command::run(place.0.path(), arguments)
 }
 
 fn start(place: &Place, arguments: &[&str]) -> Child {
     let mut command = command(place, arguments);
     command.stdout(Stdio::piped()).stderr(Stdio::piped());
     command.spawn().unwrap()
-}
-
-impl Ran {
-    fn json(&self) -> Value {
-        assert_eq!(self.status, Some(0), "{}", self.stderr);
-        serde_json::from_str(&self.stdout).unwrap()
-    }
-
-    /// The line of a refusal, which must contain these words.
-    fn refused(&self, words: &[&str]) -> &str {
-        let line = self.stderr.lines().last().unwrap_or_default();
-        println!("    {line}");
-        assert_eq!(self.status, Some(1), "{}{}", self.stdout, self.stderr);
-        let told = line.strip_prefix("mimu: ").expect(line);
-        let (place, rest) = told.split_once(": ").expect(line);
-        let (problem, remedy) = rest.split_once("; ").expect(line);
-        assert!(
-            [place, problem, remedy]
-                .iter()
-                .all(|p| !p.trim().is_empty()),
-            "{line}"
-        );
-        for word in words {
-            assert!(line.contains(word), "{word:?} is not in: {line}");
-        }
-        line
-    }
 }

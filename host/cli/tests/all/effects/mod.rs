@@ -8,7 +8,7 @@ mod law;
 mod refused;
 pub mod unit;
 
-use std::process::Command;
+use std::path::Path;
 
 use mimu::calibration::Calibration;
 use mimu::effects;
@@ -21,10 +21,9 @@ use mimu::effects::removal::remove;
 use mimu::quantity::Sensor;
 use mimu_core::compensation::Sample;
 use mimu_core::effects::{Effects, State};
-use mimu_device::Image;
 use nalgebra::Vector3;
 
-use crate::command::says;
+use crate::command::{run as command, says};
 use unit::{CUBIC, SAG, THERMAL, fitted, fitted_effect, named, record};
 
 /// All named effects, some with only part of their coefficients, and three terms; at ten times data-sheet size.
@@ -115,83 +114,13 @@ fn every_effect_comes_back_from_the_file_and_the_device_removes_what_the_pc_does
     assert!(moved[0] > 0.01 && moved[1] > 0.1, "{moved:?}");
 }
 
-/// Effects specific to one recording, such as the state of the die at its beginning, are not stored on the device.
-#[test]
-fn every_effect_goes_into_the_bytes_of_a_device() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("recording");
-    record(&path, false, true);
-    let fit = fitted(&path);
-    for effect in every_effect() {
-        let id = effect.candidate.id();
-        let text = Calibration::of(&fit, std::slice::from_ref(&effect), "2026-01-01T00:00:00Z")
-            .unwrap()
-            .to_toml();
-        let calibration = Calibration::parse(&text, "cal.toml").unwrap();
-        let image = Image::new(&calibration, "cal.toml").unwrap();
-        let stored = image.stored().unwrap();
-        assert_eq!(image.effects, [id.as_str()]);
-        let single = stored.compensator.effects.expect("one");
-        let double: Effects<f64, 8> = calibration.core_effects().unwrap();
-        let (mut of_single, mut of_double) = (State::new(10.0), State::new(10.0));
-        let (mut most, mut beside) = (0.0_f64, 0);
-        for k in 0..600 {
-            let t = f64::from(k) * 0.5;
-            let temp_c = 25.0 + 10.0 * (0.02 * t).sin();
-            single.slow(&mut of_single, 0.5, temp_c as f32);
-            double.slow(&mut of_double, 0.5, temp_c);
-            let raw = Sample {
-                gyro: Vector3::new(1.7, 1.5, 1.9).map(|v| v + 0.3 * (0.7 * t).sin()),
-                accel: Vector3::new(1.2, 1.9, 1.6).map(|v| v + 0.3 * (0.9 * t).cos()),
-            };
-            let raw_single = Sample {
-                gyro: raw.gyro.cast::<f32>(),
-                accel: raw.accel.cast::<f32>(),
-            };
-            let removed = |from: &Sample<f64>| {
-                let [gyro, accel] = Sensor::BOTH.map(|s| calibration.inverse(s).unwrap());
-                Sample {
-                    gyro: gyro.apply(&from.gyro),
-                    accel: accel.apply(&from.accel),
-                }
-            };
-            let by_double = double.remove(&mut of_double, &removed(&raw));
-            let si_single = removed(&Sample {
-                gyro: raw_single.gyro.cast(),
-                accel: raw_single.accel.cast(),
-            });
-            let by_single = single.remove(
-                &mut of_single,
-                &Sample {
-                    gyro: si_single.gyro.cast(),
-                    accel: si_single.accel.cast(),
-                },
-            );
-            let off = (by_single.gyro.cast::<f64>() - by_double.gyro).norm()
-                + (by_single.accel.cast::<f64>() - by_double.accel).norm();
-            let plain = removed(&raw);
-            let moved =
-                (by_double.gyro - plain.gyro).norm() + (by_double.accel - plain.accel).norm();
-            // Rounding error; an angular acceleration is a difference over 0.1 s.
-            beside += u32::from(off > 1e-3 * moved + 1e-4);
-            most = most.max(moved);
-        }
-        assert!(most > 1e-5, "{id}: {most}");
-        assert_eq!(beside, 0, "{id}: {beside} of 600");
-    }
-}
-
+/// Whether the command succeeds, and what it prints then or why it fails.
 pub fn mimu(arguments: &[&str]) -> (bool, String) {
-    let run = Command::new(env!("CARGO_BIN_EXE_mimu"))
-        .args(arguments)
-        .output()
-        .unwrap();
-    let text = if run.status.success() {
-        run.stdout
-    } else {
-        run.stderr
-    };
-    (run.status.success(), String::from_utf8(text).unwrap())
+    let ran = command(Path::new("."), arguments);
+    match ran.status {
+        Some(0) => (true, ran.stdout),
+        _ => (false, ran.stderr),
+    }
 }
 
 #[test]

@@ -37,7 +37,7 @@ use mutation::*;
 const DEFAULT_SEED: u64 = 20_260_101;
 const DEFAULT_SECONDS: u64 = 12;
 /// A case takes some milliseconds; after this time it counts as hanging.
-const HANG: Duration = Duration::from_secs(30);
+const HANG: Duration = Duration::from_secs(60);
 
 const MANIFEST: &str = r#"format = "mimu-recording/1"
 device = "unit-7"

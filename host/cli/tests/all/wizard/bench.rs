@@ -10,6 +10,8 @@ use mimu_rig::rig_file::{RigFile, RigTruth};
 use mimu_rig::table::TableTruth;
 use serde_json::Value;
 
+use crate::command::command;
+
 /// A running board, in a folder that is removed with it.
 pub struct Bench {
     pub truth: RigTruth,
@@ -95,36 +97,16 @@ impl Bench {
 
     /// The command, in the folder of the bench.
     pub fn mimu(&self, arguments: &str) -> Command {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_mimu"));
-        command
-            .current_dir(self.path(""))
-            .args(arguments.split(' '))
-            .stdin(Stdio::null())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped());
+        let mut command = command(&self.path(""), arguments.split(' '));
+        command.stdout(Stdio::piped()).stderr(Stdio::piped());
         command
     }
 
     /// The command with the arguments that all sessions share.
     pub fn wizard(&self, arguments: &[&str]) -> Command {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_mimu"));
-        command
-            .current_dir(self.path(""))
-            .args([
-                "wizard",
-                "-o",
-                "session",
-                "--port",
-                "port",
-                "--driver",
-                "driver.toml",
-            ])
-            .args(["--gravity", "9.793", "--warm-up", "0", "--yes"])
-            .args(["--events", "events.jsonl", "--json", "outcome.json"])
-            .args(arguments)
-            .stdin(Stdio::null())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped());
+        let shared = "wizard -o session --port port --driver driver.toml --gravity 9.793 --warm-up 0 --yes --events events.jsonl --json outcome.json";
+        let mut command = self.mimu(shared);
+        command.args(arguments);
         command
     }
 

@@ -1,7 +1,7 @@
 //! `mimu wizard` with the firmware's release image on the emulated board, on a turntable and in hands that it commands. Killed, unplugged, garbled
 //! and disturbed sessions end with the right calibration or with a clear message, and never store a wrong one.
 use super::bench::{Bench, in_repository, unit};
-use crate::command::says;
+use crate::command::mimu;
 use mimu::calibration::Calibration;
 use mimu::quantity::Sensor;
 use mimu_rig::rig_file::RigTruth;
@@ -99,30 +99,6 @@ fn on_table(plan: &str) -> [&str; 9] {
 }
 
 #[test]
-#[ignore = "nightly: a session on the emulated board; by day `device::conversation` compares the filters"]
-fn the_devices_own_filters_make_the_calibration_and_a_dwell_with_a_lost_line_leaves_no_trace() {
-    let mut bench = Bench::new("table", unit(8), 8);
-    let plan = short_plan(&bench);
-    let mut arguments = on_table(&plan).to_vec();
-    arguments.extend(["--by", "device"]);
-    let mut child = bench.wizard(&arguments).spawn().unwrap();
-    assert!(bench.heard(&mut child, "dwell", 2));
-    bench.tell("LINK OFF");
-    std::thread::sleep(std::time::Duration::from_millis(300));
-    bench.tell("LINK ON");
-    let out = child.wait_with_output().unwrap();
-    let told =
-        String::from_utf8_lossy(&out.stdout).into_owned() + &String::from_utf8_lossy(&out.stderr);
-    assert!(out.status.success(), "{told}");
-    says(&told, &["the calibration is the device's estimate"]);
-    let stored = bench.outcome()["units"][0]["stored"].clone();
-    assert_eq!(stored, "session/calibration.toml", "{told}");
-    let calibration = Calibration::read(&bench.path("session/calibration.toml")).unwrap();
-    let [gyro, accel] = errors(&calibration, &bench.truth);
-    assert!(gyro < 0.2f64.to_radians() && accel < 0.02, "{gyro} {accel}");
-}
-
-#[test]
 fn a_session_that_was_killed_and_unplugged_goes_on_to_a_stored_calibration_that_holds_the_truth() {
     let mut bench = Bench::new("table", unit(7), 7);
     // The driver file states what the table's certificate says of its rates.
@@ -177,39 +153,11 @@ fn a_session_that_was_killed_and_unplugged_goes_on_to_a_stored_calibration_that_
 }
 
 #[test]
-#[ignore = "nightly: a session on the emulated board; by day `device::thermal_record` ends at a wrong pose"]
-fn a_table_that_turns_the_wrong_axis_stops_the_session_and_nothing_is_stored() {
-    let bench = Bench::new("table", unit(7), 7);
-    let driver = std::fs::read_to_string(bench.path("driver.toml")).unwrap();
-    std::fs::write(
-        bench.path("driver.toml"),
-        driver.replace("{x} {y} {z}", "{y} {z} {x}"),
-    )
-    .unwrap();
-    let plan = short_plan(&bench);
-    #[rustfmt::skip]
-    let arguments = ["--fixture", "table", "--plan", &plan, "--as-planned", "--patience", "4"];
-    let out = bench.wizard(&arguments).output().unwrap();
-    let told = String::from_utf8_lossy(&out.stderr);
-    assert_eq!(out.status.code(), Some(1), "{told}");
-    says(&told, &["are not met", "wrong pose"]);
-    assert!(!bench.path("session/calibration.toml").exists());
-}
-
-#[test]
 fn a_driver_file_with_a_mistake_is_refused_with_its_line() {
     let folder = tempfile::tempdir().unwrap();
     let driver = folder.path().join("driver.toml");
     let text = std::fs::read_to_string(in_repository("tests/board/demo/turntable.toml")).unwrap();
     std::fs::write(&driver, text.replace("interlock =", "interlok =")).unwrap();
-    let out = std::process::Command::new(env!("CARGO_BIN_EXE_mimu"))
-        .args(["wizard", "--gravity", "9.8", "-o"])
-        .arg(folder.path().join("session"))
-        .arg("--driver")
-        .arg(&driver)
-        .output()
-        .unwrap();
-    let told = String::from_utf8_lossy(&out.stderr);
-    says(&told, &["line 5", "interlok"]);
-    assert_eq!(out.status.code(), Some(1));
+    let arguments = "wizard --gravity 9.8 -o session --driver driver.toml";
+    mimu(folder.path(), arguments).refused(&["line 5", "interlok"]);
 }

@@ -2,7 +2,6 @@
 
 use std::ffi::OsString;
 use std::path::Path;
-use std::process::Command;
 use std::sync::mpsc::{Receiver, Sender, channel};
 
 use mimu::calibration::{Calibration, TriadTable};
@@ -15,7 +14,7 @@ use mimu_wizard::session::Outcome;
 use mimu_wizard::turn::go_on;
 
 use super::text::{judge, lines, lines_in};
-use crate::command::says;
+use crate::command::{done, mimu, says};
 
 /// Relays events, and ends the session on request.
 struct Told {
@@ -193,12 +192,7 @@ fn times_of_a_clock_three_percent_fast_are_converted_and_the_intervals_hold() {
     let text = std::fs::read_to_string(&manifest).unwrap();
     let trusted = text.replace("times = \"board\"", "times = \"trusted\"");
     std::fs::write(&manifest, trusted).unwrap();
-    let fit = Command::new(env!("CARGO_BIN_EXE_mimu"))
-        .arg("fit")
-        .arg(out.join("calibration"))
-        .output()
-        .unwrap();
-    let said = String::from_utf8_lossy(&fit.stdout);
+    let said = done(&out, "fit calibration");
     assert!(
         said.contains("judgement: suspect: the clock of its samples runs 1.03"),
         "{said}"
@@ -311,22 +305,9 @@ fn a_gyro_that_is_not_of_the_population_is_named_and_fitted_without_it() {
     );
     let why = why.err().unwrap();
     says(&why, &["whole turns are fitted without a prior"]);
-    let on_table = Command::new(env!("CARGO_BIN_EXE_mimu"))
-        .args([
-            "wizard",
-            "-o",
-            "other",
-            "--port",
-            "nowhere",
-            "--gravity",
-            "9.8",
-        ])
-        .args(["--fixture", "table", "--prior"])
-        .arg(&kind)
-        .output()
-        .unwrap();
-    let why = String::from_utf8_lossy(&on_table.stderr);
-    assert!(why.contains("gravity is the only reference"), "{why}");
+    let on_table = "wizard -o other --port nowhere --gravity 9.8 --fixture table --prior kind.toml";
+    let why = mimu(folder.path(), on_table).stderr;
+    says(&why, &["gravity is the only reference"]);
     let nothing = begin_with(&out, " --prior nothing.toml").err().unwrap();
     assert!(nothing.contains("nothing.toml"), "{nothing}");
 }

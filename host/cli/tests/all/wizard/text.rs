@@ -1,7 +1,7 @@
 //! `mimu wizard` with a board of another maker, which writes lines of text into a pseudo-terminal; and its full screen.
 use std::fmt::Write as _;
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 use std::time::Duration;
 
 use mimu::calibration::Calibration;
@@ -14,7 +14,7 @@ use mimu_rig::rig_file::{RigFile, RigTruth};
 use mimu_wizard::procedure::{Fixture, first_steps, verification};
 
 use super::playback::Playback;
-use crate::command::says;
+use crate::command::{command, mimu, says};
 use nalgebra::{Matrix3, Vector3};
 
 /// Counts per rad/s, and counts; an MPU-6050 whose axes are off by a degree.
@@ -94,26 +94,12 @@ fn a_board_that_writes_lines_ends_in_a_calibration_whose_intervals_hold_its_para
     let folder = tempfile::tempdir().unwrap();
     // 100 lines per second by the board's clock, written 25 times faster.
     let playback = Playback::begin(lines(), 2500.0);
-    let mut command = Command::new(env!("CARGO_BIN_EXE_mimu"));
-    command.current_dir(folder.path()).stdin(Stdio::null());
-    command.args(["wizard", "-o", "out", "--gravity", "9.80665"]);
-    command.args([
-        "--text",
-        "t_us,ax,ay,az,gx,gy,gz",
-        "--device",
-        "plane-7",
-        "--trust-clock",
-    ]);
-    command.args(["--port", playback.path()]);
-    command.args([
-        "--fixture",
-        "hands",
-        "--dwell",
-        "1.2",
-        "--warm-up",
-        "0",
-        "--as-planned",
-    ]);
+    let arguments = format!(
+        "wizard -o out --gravity 9.80665 --text t_us,ax,ay,az,gx,gy,gz --device plane-7 --trust-clock \
+         --port {} --fixture hands --dwell 1.2 --warm-up 0 --as-planned",
+        playback.path()
+    );
+    let mut command = command(folder.path(), arguments.split(' '));
     let child = command.stdout(Stdio::piped()).stderr(Stdio::piped());
     let child = child.spawn().unwrap();
     // The wizard waits without limit for poses that do not come.
@@ -178,12 +164,10 @@ pub fn judge(calibration: &Path, said: &str) {
 
 #[test]
 fn columns_that_are_missing_are_one_line_before_any_port_is_opened() {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_mimu"));
     let arguments = "wizard -o out --gravity 9.8 --port nowhere --text ax,ay,az,gx,gy";
-    let out = command.args(arguments.split(' ')).output().unwrap();
-    let said = String::from_utf8_lossy(&out.stderr);
+    let ran = mimu(Path::new("."), arguments);
     assert!(
-        !out.status.success() && said.contains("gz is missing"),
-        "{said}"
+        ran.status != Some(0) && ran.stderr.contains("gz is missing"),
+        "{ran:?}"
     );
 }

@@ -2,7 +2,6 @@
 
 mod brute_force;
 mod next_experiment;
-mod polynomials;
 mod population;
 #[allow(dead_code)] // the tables of the papers use the rest
 #[path = "../../../../../tests/papers/published.rs"]

@@ -217,37 +217,6 @@ fn a_prior_without_biases_leaves_them_to_the_dwells() {
 }
 
 #[test]
-fn what_a_fit_with_a_prior_refuses_is_no_design() {
-    let kind = prior(&covariance(1.0));
-    let population = || Population::of(&kind, "kind.toml").unwrap();
-    // A fit needs three poses beside a prior.
-    let two = beside(&kind, 2e-3).best(2, 1).unwrap_err().to_string();
-    assert!(two.contains("at least 3"), "{two}");
-    let table = Problem::accel(Reference::Table, Fixture::ThreeAxis).unwrap();
-    let refused = table
-        .beside(population(), 2e-3, 0.0)
-        .unwrap_err()
-        .to_string();
-    assert!(refused.contains("by hand"), "{refused}");
-    let mut on_a_table = kind.clone();
-    on_a_table.reference = Reference::Table;
-    let refused = Population::of(&on_a_table, "kind.toml").unwrap_err();
-    assert!(
-        refused
-            .to_string()
-            .starts_with("kind.toml: its reference is \"table\""),
-        "{refused}"
-    );
-    let mut gyro_only = kind.clone();
-    gyro_only.gyro = gyro_only.accel.take();
-    let refused = Population::of(&gyro_only, "kind.toml").unwrap_err();
-    assert!(
-        refused.to_string().contains("no accelerometer"),
-        "{refused}"
-    );
-}
-
-#[test]
 fn a_persons_error_of_a_pose_matters_to_few_poses_only() {
     let sigma = 2e-3;
     let kind = prior(&covariance(1.0));

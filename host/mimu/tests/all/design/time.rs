@@ -15,12 +15,6 @@ fn a_budget_is_kept_and_more_of_it_helps() {
     kept(&[2.0, 5.0]);
 }
 
-#[test]
-#[ignore = "nightly: a longer session"]
-fn a_budget_of_a_quarter_of_an_hour_is_kept_and_helps() {
-    kept(&[2.0, 5.0, 15.0]);
-}
-
 fn kept(budgets: &[f64]) {
     let problem = accel(Reference::Table);
     let (mut sigmas, mut several_passes) = (Vec::new(), false);
