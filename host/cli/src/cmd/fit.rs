@@ -17,8 +17,8 @@ use mimu::result::sessions::SessionsResult;
 use mimu::sessions::class::PartClass;
 use mimu::sessions::{Sessions, fit_determined};
 use mimu::signal::stillness::DwellSearch;
-use mimu_recording::error::{Error, Result};
 use mimu_recording::ReferenceError;
+use mimu_recording::error::{Error, Result};
 use serde::Serialize;
 
 use crate::arguments::{

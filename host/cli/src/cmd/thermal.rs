@@ -20,7 +20,7 @@ use crate::arguments::{
     with_noise,
 };
 use crate::hint::OF_A_LOG;
-use crate::output::{Results, check_outputs, now, print};
+use crate::output::{Results, now};
 use crate::reading::{LogArgs, read};
 use crate::report::{self, Made, thermal_plot};
 use crate::status::Status;

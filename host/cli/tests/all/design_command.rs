@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::command::{self, Ran, all_refused, says};
+use super::command::{self, Ran, all_refused};
 
 fn mimu(folder: &Path, arguments: &str) -> Ran {
     command::mimu(folder, &format!("design {arguments}"))

@@ -402,7 +402,7 @@ impl<'a> Factors<'a> {
                 let by = ClosureError::by_increments(&self.turns[own.clone()], gyro);
                 Some((own, vec![by.unwrap_or_default().concat()]))
             }
-            Kind::Magnitude { .. } | Kind::Rest(..) | Kind::Stated(..) | Kind::Population(..) => {
+            Kind::Magnitude { .. } | Kind::Input { .. } | Kind::Stated(..) | Kind::Population(..) => {
                 None
             }
         }

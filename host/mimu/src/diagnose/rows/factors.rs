@@ -31,7 +31,7 @@ impl Part<'_> {
             let dwells: Vec<usize> = starts.map(|of| of[0]).collect();
             let random_walk = (first[0] == first[1]).then(|| self.random_walk(&dwells));
             let axes = match group[0].0.kind {
-                Kind::Rest(..) => [0, 1, 2].map(Some).to_vec(),
+                Kind::Input { .. } => [0, 1, 2].map(Some).to_vec(),
                 _ => vec![None],
             };
             for axis in axes {
@@ -91,7 +91,7 @@ impl Part<'_> {
         let poses = prepared.observations(Sensor::Accel);
         self.centre = mean(poses.iter().map(|o| &o.raw));
         self.free = &LOWER[..6];
-        self.add_factors(&prepared.magnitudes(&self.model));
+        self.add_factors(&prepared.magnitudes(&self.model).0);
     }
 
     /// Three rows for each pose: the error of the force as a vector. [`Self::add_magnitudes`] contain only its part along the force. The rest
