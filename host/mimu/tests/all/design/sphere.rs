@@ -1,5 +1,7 @@
 //! Attitudes and rates: optima on the sphere.
 
+use std::f64::consts::PI;
+
 use mimu::plan::design::Problem;
 use mimu::plan::design::exchange;
 use mimu::plan::design::information::Inverse;
