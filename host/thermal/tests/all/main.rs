@@ -7,9 +7,7 @@ mod estimates;
 mod judged;
 mod plan;
 mod refused;
-#[path = "../../../../tests/thermal/simulation.rs"]
 mod simulation;
-#[path = "../../../../tests/thermal/soak.rs"]
 mod soak;
 mod soaked;
 
