@@ -1,5 +1,7 @@
 //! Fit and diagnosis of recordings with temperature ramps: the noise floor, the warning and the effects found. The bench knows the truth.
 
+use std::sync::Arc;
+
 use mimu::diagnose::{Recordings, diagnose};
 use mimu::fit::{Options, fit};
 use mimu::prepared::Prepared;
@@ -9,7 +11,6 @@ use mimu::warning::Warning;
 use mimu_rig::rig_file::RigFile;
 use mimu_tests::bench;
 use mimu_tests::ramp::{plan, thermal, unit};
-use std::sync::Arc;
 
 fn floors(prepared: Prepared) -> [f64; 2] {
     let fitted = fit(prepared, Options::IN_SAMPLE).expect("a fit");

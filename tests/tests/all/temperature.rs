@@ -1,7 +1,6 @@
 //! Temperature in fit and diagnosis: sweeps that no affine model follows, intervals of lags, given matrices, one pose, and the time since power-on.
 //! The bench knows the truth.
 
-use mimu::warning::Warning;
 use std::fmt::Write as _;
 
 use mimu::calibration::Calibration;
@@ -12,6 +11,7 @@ use mimu::plan::next_experiment::next;
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
 use mimu::result::diagnosis::DiagnosisResult;
+use mimu::warning::Warning;
 use mimu_cli::report::{Detail, Made, diagnosis_page, diagnosis_text};
 use mimu_recording::Recorded;
 use mimu_rig::random::Random;
