@@ -3,11 +3,9 @@
 use std::f64::consts::TAU;
 
 use mimu_core::compensation::{Affine, Sample};
-use mimu_core::effects::{
-    DeviceEffect, EffectError, Effects, RATE_LAG_S, REFERENCE_C, State, Variable,
-};
+use mimu_core::effects::{DeviceEffect, EffectError, Effects, State, Variable};
 use mimu_core::{PerSensor, Sensor};
-use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
+use nalgebra::{Matrix3, Vector3};
 use proptest::prelude::*;
 
 type Eight = Effects<f64, 8>;
@@ -109,24 +107,6 @@ fn assert_third_order(left: (f64, f64), slope: f64) {
         worst < 2.0 * slope * slope * error,
         "{worst:e} of {error:e}"
     );
-}
-
-#[test]
-fn sagging_proof_masses_no_longer_read_force_as_rate() {
-    let unit = Mounted::crooked();
-    let matrix = [1e-3, 2e-3, -3e-3, 4e-3, -5e-3, 6e-3, 7e-3, 8e-3, -9e-3];
-    let effects = with(&[named("gyro_g_sensitivity", &matrix)], &unit.inverse());
-    // Each axis up: the error is a column of the matrix; the accelerometer has no error.
-    for axis in 0..3 {
-        let force = Vector3::ith(axis, 9.8);
-        let error = Vector3::new(matrix[axis], matrix[3 + axis], matrix[6 + axis]) * 9.8;
-        let rate = Vector3::new(0.3, -0.2, 0.1);
-        let gyro = unit.inverse().apply(&unit.read(&rate, &error));
-        assert!((gyro - rate).norm() > 0.01);
-        let clean = effects.remove(&mut State::new(1e3), &Sample { gyro, accel: force });
-        assert!((clean.gyro - rate).norm() < 1e-14);
-        assert_eq!(clean.accel, force);
-    }
 }
 
 #[test]
@@ -237,54 +217,6 @@ fn what_one_evaluation_a_sample_leaves_is_far_below_the_noise_of_a_sample() {
     assert_eq!((again - x).norm(), left[0]);
 }
 
-#[test]
-fn force_across_the_comb_is_taken_out() {
-    let c = [1e-4, 2e-4, 3e-4, -4e-4, 5e-4, -6e-4, 7e-4, 8e-4, 9e-4];
-    // A product is a quarter of the difference of the squares of sum and difference.
-    let product = |a: f64, b: f64| 0.25 * ((a + b).powi(2) - (a - b).powi(2));
-    let error = |s: &Vector3<f64>| {
-        let pairs = [product(s.x, s.y), product(s.y, s.z), product(s.z, s.x)];
-        Vector3::from_fn(|i, _| (0..3).map(|k| c[3 * i + k] * pairs[k]).sum())
-    };
-    assert_third_order(
-        left("accel_cross_axis_product", &c, error),
-        3.0 * 9e-4 * 4.0,
-    );
-}
-
-#[test]
-fn arms_of_a_spinning_unit_are_those_of_its_path_through_space() {
-    let arms = [3e-3, -8e-3, 5e-3, 4e-3, 9e-3, -2e-3, 7e-3, 1e-3, -6e-3];
-    let effects = with(&[named("accel_size_effect", &arms)], &si());
-    let axis = Unit::new_normalize(Vector3::new(0.3, -0.7, 0.6));
-    let (rate, spin_up, dt) = (6.0, 40.0, 1e-3);
-    let attitude = |t: f64| Rotation3::from_axis_angle(&axis, rate * t + 0.5 * spin_up * t * t);
-    let mut state = State::new(1.0 / dt);
-    for k in 0..200 {
-        let t = f64::from(k) * dt;
-        let gyro = axis.into_inner() * (rate + spin_up * t);
-        // Each sensor senses, along its own axis, the acceleration of its position.
-        let h = 1e-4;
-        let accel = Vector3::from_fn(|i, _| {
-            let arm = Vector3::new(arms[3 * i], arms[3 * i + 1], arms[3 * i + 2]);
-            let path = |t: f64| attitude(t) * arm;
-            let felt = (path(t + h) - path(t) * 2.0 + path(t - h)) / (h * h);
-            (attitude(t).inverse() * felt)[i]
-        });
-        let clean = effects.remove(&mut state, &Sample { gyro, accel });
-        // The first sample has no predecessor, so its angular acceleration is unknown.
-        if k > 0 {
-            assert!(accel.norm() > 0.1);
-            assert!(
-                clean.accel.norm() < 1e-5 * accel.norm(),
-                "{:e}",
-                clean.accel.norm()
-            );
-        }
-        assert_eq!(clean.gyro, gyro);
-    }
-}
-
 /// Bias that is removed from a triad at rest.
 fn bias<const N: usize>(effects: &Effects<f64, N>, state: &mut State<f64, N>) -> Vector3<f64> {
     let rest = Sample {
@@ -322,20 +254,6 @@ fn drift_of_ten_hours_is_removed_to_the_last_digits_of_single_precision() {
 }
 
 #[test]
-fn a_warm_up_is_half_as_large_after_each_half_life() {
-    let warm_up = DeviceEffect::named("accel_warm_up", &[0.04, 0.0, -0.08], Some(100.0)).unwrap();
-    let effects = with(&[warm_up], &si());
-    let mut state = State::new(1000.0);
-    effects.slow(&mut state, 0.0, f64::NAN);
-    for halvings in 0..8 {
-        let half = 0.5_f64.powi(halvings);
-        let expected = Vector3::new(0.04, 0.0, -0.08) * half;
-        assert!((bias(&effects, &mut state) - expected).norm() < 1e-14);
-        effects.slow(&mut state, 100.0 * 2.0_f64.ln(), f64::NAN);
-    }
-}
-
-#[test]
 fn long_after_power_on_a_warm_up_is_over_and_a_drift_counts_from_the_beginning() {
     let warm_up = DeviceEffect::named("accel_warm_up", &[0.04, 0.0, -0.08], Some(100.0)).unwrap();
     let drift = |axis, coefficient| {
@@ -348,45 +266,6 @@ fn long_after_power_on_a_warm_up_is_over_and_a_drift_counts_from_the_beginning()
     effects.slow(&mut state, 600.0, f64::NAN);
     let expected = Vector3::new(6e-3, 0.0, 12e-3);
     assert!((bias(&effects, &mut state) - expected).norm() < 1e-14);
-}
-
-#[test]
-fn thermal_errors_are_those_of_a_sensor_at_that_temperature() {
-    let unit = Mounted::crooked();
-    let effects = with(
-        &[
-            named("gyro_thermal_bias", &[1e-3, 2e-3, -3e-3, 1e-5, -2e-5, 3e-5]),
-            named("gyro_thermal_scale", &[1e-4, -2e-4, 3e-4]),
-            named(
-                "gyro_thermal_misalignment",
-                &[2e-5, -3e-5, 4e-5, 5e-5, -6e-5, 7e-5],
-            ),
-        ],
-        &unit.inverse(),
-    );
-    let mut state = State::new(1000.0);
-    let rate = Vector3::new(1.0, -2.0, 3.0);
-    // Expected at 45 °C: 20 times the linear and 400 times the quadratic coefficient; 20 times 1e-4 of each sensed input; 20 times 2e-5 rad.
-    let sensed = unit.sensed(&rate);
-    let error = Vector3::new(
-        0.024 + 0.002 * sensed.x + 20.0 * (2e-5 * -2.0 - 3e-5 * 3.0),
-        0.032 - 0.004 * sensed.y + 20.0 * (4e-5 * 1.0 + 5e-5 * 3.0),
-        -0.048 + 0.006 * sensed.z + 20.0 * (-6e-5 * 1.0 + 7e-5 * -2.0),
-    );
-    effects.slow(&mut state, 0.1, 45.0);
-    let gyro = unit.inverse().apply(&unit.read(&rate, &error));
-    let accel = Vector3::zeros();
-    let clean = effects.remove(&mut state, &Sample { gyro, accel });
-    assert!((gyro - rate).norm() > 0.05);
-    // Scale and misalignment act on the reading with its error: 0.6 % of an error of 0.05.
-    assert!((clean.gyro - rate).norm() < 6e-4);
-    // If the thermometer fails, the last temperature is used; at the reference temperature nothing is removed.
-    effects.slow(&mut state, 0.1, f64::NAN);
-    state.gap();
-    assert_eq!(effects.remove(&mut state, &Sample { gyro, accel }), clean);
-    effects.slow(&mut state, 0.1, REFERENCE_C);
-    let left = effects.remove(&mut state, &Sample { gyro, accel }).gyro - gyro;
-    assert!(left.norm() < 1e-15);
 }
 
 #[test]
@@ -403,57 +282,6 @@ fn an_effect_of_the_temperature_of_before_says_that_it_remembers() {
     };
     assert!(term(&[Variable::RateX, Variable::TemperatureRate]));
     assert!(!term(&[Variable::RateX, Variable::Temperature]));
-}
-
-#[test]
-fn a_late_die_lags_behind_a_ramp_by_slope_times_lag() {
-    let lag_s = 120.0;
-    let effect = DeviceEffect::named("gyro_thermal_lag", &[1e-3, 0.0, -2e-3], Some(lag_s)).unwrap();
-    let effects = with(&[effect], &si());
-    let slope = 0.05; // 3 °C a minute
-    for dt in [0.1, 1.0, 17.0] {
-        let mut state = State::new(1000.0);
-        effects.slow(&mut state, 0.0, -10.0);
-        let mut t = 0.0;
-        while t < 600.0 {
-            t += dt;
-            effects.slow(&mut state, dt, -10.0 + slope * t);
-            // First-order response to a ramp, in closed form, at any step.
-            let behind = -slope * lag_s * (1.0 - (-t / lag_s).exp());
-            let expected = Vector3::new(1e-3, 0.0, -2e-3) * behind;
-            assert!((bias(&effects, &mut state) - expected).norm() < 1e-14);
-        }
-    }
-}
-
-#[test]
-fn terms_are_products_of_what_they_name() {
-    use Variable::{ForceY, RateX, Temperature, TemperatureRate, Time};
-    let term = |axis, c, v: &[Variable]| DeviceEffect::term(Sensor::Gyro, axis, c, v).unwrap();
-    let cubic = term(0, 2e-3, &[RateX, ForceY, ForceY]);
-    let warm = term(1, 5e-5, &[Temperature, Time]);
-    let rising = term(2, 0.5, &[TemperatureRate]);
-    let mixed = term(2, 0.025, &[RateX, Temperature]);
-    assert!(!cubic.is_slow() && warm.is_slow() && rising.is_slow() && !mixed.is_slow());
-    let effects = with(&[cubic, warm, rising, mixed], &si());
-    let mut state = State::new(1000.0);
-    // 0.02 °C/s until the filter has settled, to 25 + 8 °C at 400 s.
-    for k in 0..=4000 {
-        let dt = if k == 0 { 0.0 } else { 0.1 };
-        effects.slow(&mut state, dt, 25.0 + 0.002 * f64::from(k));
-    }
-    let gyro = Vector3::new(3.0, 0.0, 0.0);
-    let accel = Vector3::new(0.0, -4.0, 0.0);
-    let removed = gyro - effects.remove(&mut state, &Sample { gyro, accel }).gyro;
-    let settled = 0.02 * (1.0 - (-400.0 / RATE_LAG_S).exp());
-    // The second evaluation is at the rate without the first estimate of its error.
-    let rate = 3.0 - 2e-3 * 3.0 * 16.0;
-    let expected = Vector3::new(
-        2e-3 * rate * 16.0,
-        5e-5 * 8.0 * 400.0,
-        0.5 * settled + 0.025 * rate * 8.0,
-    );
-    assert!((removed - expected).norm() < 1e-9, "{removed} {expected}");
 }
 
 #[test]

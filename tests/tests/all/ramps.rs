@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use mimu::diagnose::rejected::{Reason, Rejected};
 use mimu::diagnose::{Recordings, diagnose};
 use mimu::fit::{Options, fit};
 use mimu::prepared::Prepared;
@@ -79,58 +78,4 @@ fn a_diagnosis_that_accepted_thermal_effects_does_not_say_that_the_model_has_no_
     );
     let none = of(&unit(4));
     assert!(said(&none)[0].ends_with("but the model does not depend on temperature"));
-}
-
-/// Cubics of bias and scale factor, and dies that lag the thermometer by 150 s, from -20 to 70 °C and back: 43 rounds take 6000 s. 20 rounds would
-/// show only the way up. There a lag looks like a bias, and the held-out blocks reject it.
-#[test]
-#[ignore = "nightly: a recording of 6000 s"]
-fn what_is_found_from_the_data_does_not_keep_out_a_lag_and_what_is_significant_is_rejected_with_a_reason()
- {
-    let ramp = plan(
-        43,
-        10.0,
-        &[
-            [0.0, -20.0],
-            [300.0, -20.0],
-            [3000.0, 70.0],
-            [3300.0, 70.0],
-            [6000.0, -20.0],
-        ],
-    );
-    let mut file = unit(5);
-    file.thermal.die_lag_s = Some([150.0; 4]);
-    file.unit.temperature = Some(mimu_rig::unit::TemperatureSensor::Board);
-    let gyro = &mut file.curves.gyro;
-    gyro.bias_deg_per_h = Some([
-        [0.0, 120.0, 1.5, 0.02],
-        [0.0, -80.0, 1.0, -0.03],
-        [0.0, 60.0, -2.0, 0.015],
-    ]);
-    gyro.scale_ppm = Some([
-        [0.0, 120.0, -2.0, 0.02],
-        [0.0, -90.0, 1.0, 0.0],
-        [0.0, 60.0, 2.0, -0.02],
-    ]);
-    let only = Options {
-        only: Some(Sensor::Gyro),
-        ..Options::IN_SAMPLE
-    };
-    let diagnosis = diagnose(Recordings::from(bench::recorded(&ramp, &file, 5)), only);
-    let diagnosis = diagnosis.expect("a diagnosis");
-    let decision = &diagnosis.sensors[0].decision;
-    let accepted = decision.accepted.iter().map(|a| a.chosen.candidate.id());
-    let accepted: Vec<String> = accepted.collect();
-    assert!(
-        accepted.contains(&"gyro_thermal_lag".to_string()),
-        "{accepted:?} {:?}",
-        decision.rejected
-    );
-    let bare = |r: &&Rejected| {
-        let significant =
-            matches!(&r.reason, Reason::NotChosen(n) if n.p < 1e-6 && n.why.is_none());
-        !r.id.starts_with("term:") && significant
-    };
-    let without: Vec<_> = decision.rejected.iter().filter(bare).collect();
-    assert!(without.is_empty(), "{without:?}");
 }

@@ -1,23 +1,21 @@
 //! `mimu verify` and `mimu apply` with a calibration over temperature, on a unit whose forward model is written here: cubics of the temperature of
 //! dies that lag the thermometer.
 
-use mimu::quantity::PerSensor;
-use std::fmt::Write as _;
 use std::path::Path;
 
 use mimu::calibration::{Calibration, DieTable, NodeTable, OverTemperature, TemperatureNode};
 use mimu::fit::{Options, fit};
 use mimu::prepared::Prepared;
+use mimu::quantity::PerSensor;
 use mimu::signal::stillness::STILL_FACTOR;
-use mimu_recording::{Batch, Recording};
+use mimu_recording::Recording;
 use nalgebra::{Matrix3, Vector3};
 
+use super::effects::applied::read;
 use super::effects::{mimu, unit};
-use crate::random::congruential;
 
-const DWELLS: usize = 72;
-const RATE_HZ: f64 = 50.0;
-const ROWS: usize = 100;
+/// Of a dwell.
+const ROWS: usize = (unit::DWELL_S * unit::RATE_HZ) as usize;
 /// Lags of the dies of gyro and accelerometer, s, and the ramp of the thermometer, °C/s from 0 °C.
 const LAGS_S: [f64; 2] = [20.0, 8.0];
 const RAMP: f64 = 0.35;
@@ -53,42 +51,12 @@ fn dies_c(t_s: f64) -> [f64; 2] {
 
 /// Records the unit on a table: at 25 °C, or over the ramp.
 fn record(folder: &Path, ramp: bool) {
-    std::fs::create_dir(folder).unwrap();
-    let manifest = format!(
-        "format = \"mimu-recording/1\"\ndevice = \"bench\"\nsample_rate_hz = {RATE_HZ:?}\n\
-         gravity_mps2 = {:?}\nraw_unit = \"V\"\nreference = \"table\"\n",
-        unit::G
-    );
-    std::fs::write(folder.join("recording.toml"), manifest).unwrap();
-    let mut out = String::from(
-        "t_s,step,temp_c,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z,ref_rate_x_dps,ref_rate_y_dps,\
-         ref_rate_z_dps,ref_force_x_mps2,ref_force_y_mps2,ref_force_z_mps2\n",
-    );
-    let mut uniform = congruential(11);
-    let mut normal = move || (0..12).map(|_| uniform()).sum::<f64>() - 6.0;
-    for k in 0..DWELLS * ROWS {
-        let (t, step) = (k as f64 / RATE_HZ, k / ROWS);
-        let s = step as f64;
-        let force =
-            Vector3::new((2.4 * s).sin(), (2.4 * s).cos(), (0.9 * s).sin()).normalize() * unit::G;
-        let rate_dps = Vector3::new((1.3 * s).sin(), (1.7 * s).cos(), (2.9 * s).sin()) * 60.0;
-        let (shown, dies) = match ramp {
-            true => (thermometer_c(t), dies_c(t)),
-            false => (25.0, [25.0; 2]),
-        };
-        write!(out, "{t:.4},{step},{shown:.6}").unwrap();
-        for (sensor, input) in [rate_dps.map(f64::to_radians), force].iter().enumerate() {
-            let (p, b) = forward(sensor, dies[sensor]);
-            for u in (p * input + b).iter() {
-                write!(out, ",{:.9}", u + unit::NOISE[sensor] * normal()).unwrap();
-            }
-        }
-        for v in rate_dps.iter().chain(force.iter()) {
-            write!(out, ",{v:.9}").unwrap();
-        }
-        out.push('\n');
-    }
-    std::fs::write(folder.join("samples.csv"), out).unwrap();
+    let shown = |t: f64| if ramp { thermometer_c(t) } else { 25.0 };
+    unit::record_with(folder, 11, Some(&shown), |sensor, t, inputs| {
+        let dies = if ramp { dies_c(t) } else { [25.0; 2] };
+        let (p, b) = forward(sensor, dies[sensor]);
+        p * inputs[sensor] + b
+    });
 }
 
 /// A node with the truth at a temperature, and its derivative from neighbouring temperatures.
@@ -189,7 +157,7 @@ fn curves_and_lag_leave_the_noise_and_the_model_of_one_temperature_does_not() {
     }
     // The count is by blocks, so it is accurate to a block at either end.
     let seconds = |inside: &dyn Fn(f64) -> bool| {
-        let all = (0..DWELLS * ROWS).map(|k| k as f64 / RATE_HZ);
+        let all = (0..unit::DWELLS * ROWS).map(|k| k as f64 / unit::RATE_HZ);
         all.filter(|t| !inside(*t)).count() as f64
     };
     let (count, by) = outside(&curves);
@@ -229,18 +197,7 @@ fn a_compensated_recording_follows_the_dies() {
     ]);
     assert!(done, "{text}");
     outside(&serde_json::from_str(&text).unwrap());
-    let mut all = Batch::default();
-    let collect = |batch: &Batch| {
-        for (into, from) in all.raw.iter_mut().zip(&batch.raw) {
-            into.extend(from);
-        }
-        for (into, from) in all.reference.iter_mut().zip(&batch.reference) {
-            into.extend(from);
-        }
-        Ok(())
-    };
-    let recording = Recording::open(Path::new(&out)).unwrap();
-    recording.for_each_batch(|_| (), collect).unwrap();
+    let (_, all) = read(Path::new(&out));
     for c in 0..6 {
         let unit = if c < 3 { 1.0_f64.to_radians() } else { 1.0 };
         let errors: Vec<f64> = all.raw[c]

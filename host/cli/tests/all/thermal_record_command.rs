@@ -6,44 +6,15 @@ use std::path::Path;
 use std::process::{Child, Output};
 use std::time::{Duration, Instant};
 
-use mimu::calibration::Calibration;
 use mimu_recording::{Manifest, Recording, Reference};
-use mimu_rig::located::Source;
-use mimu_rig::plan::Plan;
 use mimu_rig::rig_file::RigTruth;
 use serde_json::Value;
 
 use crate::command::mimu;
 use crate::wizard::bench::{Bench, unit};
-use crate::wizard::on_board::errors;
 
-/// Rates in both directions about all axes, and a turn by an angle there and back, while the chamber goes from 12 to 25 °C.
-fn sweep() -> String {
-    let mut plan = String::from(
-        "format = \"mimu-plan/1\"\nsample_rate_hz = 1000.0\ncarrier = \"table\"\ngravity_mps2 = 9.793\n\
-         chamber_c = [[0.0, 12.0], [5.0, 12.0], [85.0, 25.0]]\nlead_in_s = 2.0\nrounds = 3\n",
-    );
-    for (up, rate) in [
-        ("0.0, 0.0, 1.0", 60.0),
-        ("1.0, 0.0, 0.0", 60.0),
-        ("0.0, 1.0, 0.0", 60.0),
-        ("0.0, 0.0, -1.0", 60.0),
-        ("-1.0, 0.0, 0.0", 60.0),
-        ("0.0, -1.0, 0.0", 60.0),
-        ("0.0, 0.0, 1.0", 0.0),
-    ] {
-        plan += &format!("[[step]]\nup = [{up}]\nrate_dps = {rate:?}\ndwell_s = 2.5\n");
-    }
-    for (deg, then) in [
-        (90.0, "[[step]]\nstay = true\ndwell_s = 2.5\n"),
-        (-90.0, ""),
-    ] {
-        plan += &format!(
-            "[[step]]\nturn_axis = \"middle\"\nturn_deg = {deg:?}\nturn_dps = 45.0\n{then}"
-        );
-    }
-    plan
-}
+const PLAN: &str = "format = \"mimu-plan/1\"\nsample_rate_hz = 1000.0\ncarrier = \"table\"\ngravity_mps2 = 9.793\n\
+                    chamber_c = [[0.0, 12.0], [85.0, 25.0]]\n[[step]]\nup = [0.0, 0.0, 1.0]\nrate_dps = 60.0\ndwell_s = 2.5\n";
 
 /// A unit that follows the chamber within seconds, on a fast table: the test takes a minute or two.
 fn brisk(seed: u64) -> RigTruth {
@@ -92,90 +63,6 @@ fn recorded(path: &Path) -> Inputs {
     );
     each.unwrap();
     all
-}
-
-/// The inputs that the bench writes when it carries out the same plan without mimu.
-fn by_the_bench(plan: &str, truth: &RigTruth) -> Inputs {
-    let plan = Plan::parse(Source::new("plan", plan)).unwrap();
-    let mut all = Inputs::new();
-    for row in mimu_rig::record::samples(&plan, truth, 1).unwrap() {
-        let (sum, count) = all
-            .entry(row.instant.step.map_or(-1, |s| s as i32))
-            .or_default();
-        *count += 1.0;
-        let rate = row.instant.stated_rate.unwrap().map(f64::to_degrees);
-        let input = [rate, row.instant.stated_force.unwrap()].concat();
-        for (sum, value) in sum.iter_mut().zip(input) {
-            *sum += value;
-        }
-    }
-    all
-}
-
-#[test]
-#[ignore = "nightly: minutes of the emulated board; by day `host/equipment` carries out sequences"]
-fn a_plan_is_carried_out_and_its_recording_has_the_inputs_of_the_bench_and_is_fitted() {
-    let bench = Bench::new("table", brisk(11), 11);
-    let plan = sweep();
-    std::fs::write(bench.path("plan.toml"), &plan).unwrap();
-    let command =
-        "thermal record plan.toml --driver driver.toml --port port -o sweep --json made.json";
-    let out = bench.mimu(command).output().unwrap();
-    let told = told(&out);
-    assert!(out.status.success(), "{told}");
-    let made = json(&bench.path("made.json"));
-    assert_eq!(made["format"], "mimu-thermal-record/1");
-    assert_eq!(made["dwells_done"], 30, "{told}");
-    assert_eq!(made["cut_short"], Value::Null);
-    for round in 1..=3 {
-        assert!(told.contains(&format!("round {round} of 3")), "{told}");
-    }
-
-    let (found, wanted) = (
-        recorded(&bench.path("sweep")),
-        by_the_bench(&plan, &bench.truth),
-    );
-    assert_eq!(found.len(), wanted.len(), "the same dwells, and transit");
-    for (step, (wanted, count)) in wanted.iter().filter(|(step, _)| **step >= 0) {
-        let (input, samples) = &found[step];
-        let is_turn = matches!(step % 10, 7 | 9);
-        for (axis, (wanted, input)) in wanted.iter().zip(input).enumerate() {
-            match is_turn {
-                // The angle, however long the table takes. The force rotates during a turn, so the reference is empty.
-                true if axis < 3 => {
-                    let off = (wanted - input) / 1000.0;
-                    assert!(off.abs() < 0.1, "turn {step}: {wanted} {input}");
-                }
-                true => assert!(input.is_nan()),
-                false => {
-                    let off = wanted / count - input / samples;
-                    assert!(off.abs() < 1e-6, "dwell {step}, axis {axis}: {off}");
-                }
-            }
-        }
-        let longer = samples - count;
-        let most = if is_turn { 3000.0 } else { 100.0 };
-        assert!(
-            (0.0..most).contains(&longer),
-            "dwell {step}: {longer} samples longer"
-        );
-    }
-
-    // The lag is given, because a minute of heating does not distinguish it from a slope.
-    let out = bench
-        .mimu("thermal fit sweep --lag 1 -o cal.toml --json fit.json")
-        .output()
-        .unwrap();
-    assert!(out.status.success(), "{}", self::told(&out));
-    let fit = json(&bench.path("fit.json"));
-    let range = &fit["range_c"];
-    // By self-heating the dies are warmer than the chamber.
-    let span = range[1].as_f64().unwrap() - range[0].as_f64().unwrap();
-    assert!((10.0..14.0).contains(&span), "{range}");
-    let calibration = Calibration::read(&bench.path("cal.toml")).unwrap();
-    let [gyro, accel] = errors(&calibration, &bench.truth);
-    // As for a session of the wizard: 18 dwells of 2.5 s instead of twelve of 1 s, but also a slope over temperature.
-    assert!(gyro < 0.2f64.to_radians() && accel < 0.02, "{gyro} {accel}");
 }
 
 /// Waits until the command has written this many bytes of samples.
@@ -256,8 +143,8 @@ fn what_cannot_be_carried_out_is_refused_in_a_line_before_anything_is_opened() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
     let write = |name: &str, text: &str| std::fs::write(path(name), text).unwrap();
-    write("plan.toml", &sweep());
-    write("cold.toml", &sweep().replace("chamber_c", "# chamber_c"));
+    write("plan.toml", PLAN);
+    write("cold.toml", &PLAN.replace("chamber_c", "# chamber_c"));
     std::fs::create_dir(path("there")).unwrap();
     write("there/samples.csv", "");
     write(

@@ -12,9 +12,7 @@ mod plan;
 #[path = "../../../../tests/thermal/points.rs"]
 mod points;
 mod refused;
-#[path = "../../../../tests/thermal/simulation.rs"]
 mod simulation;
-#[path = "../../../../tests/thermal/soak.rs"]
 mod soak;
 mod soaked;
 

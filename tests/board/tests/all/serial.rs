@@ -1,4 +1,5 @@
 //! The device behind its serial line: its identity and its samples.
+
 use mimu_board::schematic::{DIVIDER_RATIO, Net, Volts, WIRING};
 use mimu_board_tests::conversation::{Answer, Conversation, Sample};
 use mimu_board_tests::{MS, STARTED, still};

@@ -1,4 +1,5 @@
 //! The emulated board behind its pseudo-terminal, as seen by a program that opens serial ports.
+
 use std::path::Path;
 use std::time::{Duration, Instant};
 

@@ -68,8 +68,6 @@ pub enum Act {
     Restart,
     /// The port disappears.
     Vanish,
-    /// The device is without power for `away_ms` while its port stays, as behind an ST-LINK. Then it starts, and its greeting is lost.
-    PowerCut { away_ms: u64 },
     /// The cable is pulled, and plugged in again after `away_ms`: a different port of the same name. The device continues meanwhile.
     Unplug { away_ms: u64 },
 }
@@ -190,7 +188,6 @@ impl Peer {
         let device = Device {
             port: Some(port),
             back: None,
-            off_until: None,
             seen: seen.clone(),
             stop: stop.clone(),
             script,
@@ -245,8 +242,6 @@ struct Device {
     port: Option<Terminal>,
     /// When the port returns.
     back: Option<Instant>,
-    /// Until when it is without power.
-    off_until: Option<Instant>,
     seen: Arc<Mutex<Seen>>,
     stop: Arc<AtomicBool>,
     script: Script,
@@ -281,13 +276,6 @@ impl Device {
                     0
                 }
             };
-            if let Some(until) = self.off_until {
-                if Instant::now() >= until {
-                    self.off_until = None;
-                    self.begin_anew();
-                }
-                continue;
-            }
             match self.script.behaviour {
                 Behaviour::Device => {
                     for byte in &bytes[..count] {

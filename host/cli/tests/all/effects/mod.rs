@@ -1,6 +1,6 @@
 //! Effects in a calibration: written, read, removed by the PC and the device alike, and shown by `mimu verify`.
 
-mod applied;
+pub mod applied;
 mod core_program;
 mod gaps;
 mod kept;

@@ -1,5 +1,8 @@
 //! The unit of these tests, a recording of it, and effects for it.
 
+use std::fmt::Write as _;
+use std::path::Path;
+
 use mimu::effects;
 use mimu::effects::candidate::{Candidate, CandidateKind};
 use mimu::effects::fitted::FittedEffect;
@@ -8,8 +11,6 @@ use mimu::prepared::Prepared;
 use mimu::signal::stillness::STILL_FACTOR;
 use mimu_recording::Recording;
 use nalgebra::{Matrix3, Vector3};
-use std::fmt::Write as _;
-use std::path::Path;
 
 use crate::random::congruential;
 
@@ -48,8 +49,14 @@ pub const CUBIC: f64 = 3e-5;
 /// Thermal bias of gyro z, rad/s/K.
 pub const THERMAL: f64 = 5e-4;
 
-/// Records the unit on a table, with or without its flaws; `temp` says whether temp_c is recorded.
-pub fn record(folder: &Path, flawed: bool, temp: bool) {
+/// Records a unit on a table: `read` gives the readings of gyro (0) or accelerometer at a time, for the rate and the force then, V. Without `temp_c` no
+/// temperature is recorded.
+pub fn record_with(
+    folder: &Path,
+    seed: u64,
+    temp_c: Option<&dyn Fn(f64) -> f64>,
+    read: impl Fn(usize, f64, &[Vector3<f64>; 2]) -> Vector3<f64>,
+) {
     std::fs::create_dir(folder).unwrap();
     let manifest = format!(
         "format = \"mimu-recording/1\"\ndevice = \"bench\"\nsample_rate_hz = {RATE_HZ:?}\n\
@@ -57,13 +64,13 @@ pub fn record(folder: &Path, flawed: bool, temp: bool) {
     );
     std::fs::write(folder.join("recording.toml"), manifest).unwrap();
     let mut out = String::from("t_s,step,");
-    if temp {
+    if temp_c.is_some() {
         out.push_str("temp_c,");
     }
     out.push_str("gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z,");
     out.push_str("ref_rate_x_dps,ref_rate_y_dps,ref_rate_z_dps,");
     out.push_str("ref_force_x_mps2,ref_force_y_mps2,ref_force_z_mps2\n");
-    let mut uniform = congruential(7 + u64::from(flawed));
+    let mut uniform = congruential(seed);
     // Sum of twelve uniform numbers: approximately normal.
     let mut normal = move || (0..12).map(|_| uniform()).sum::<f64>() - 6.0;
     let rows = (DWELL_S * RATE_HZ) as usize;
@@ -73,25 +80,14 @@ pub fn record(folder: &Path, flawed: bool, temp: bool) {
         // Directions and rates that repeat late: 2.4 rad is nearly the golden angle.
         let force = Vector3::new((2.4 * s).sin(), (2.4 * s).cos(), (0.9 * s).sin()).normalize() * G;
         let rate_dps = Vector3::new((1.3 * s).sin(), (1.7 * s).cos(), (2.9 * s).sin()) * 60.0;
-        let mut inputs = [rate_dps.map(f64::to_radians), force];
+        let inputs = [rate_dps.map(f64::to_radians), force];
         write!(out, "{t:.4},{step}").unwrap();
-        if temp {
+        if let Some(temp_c) = temp_c {
             write!(out, ",{:.6}", temp_c(t)).unwrap();
         }
-        for (sensor, input) in inputs.iter_mut().enumerate() {
-            let (p, b) = forward(sensor);
-            let scale = Vector3::from_fn(|i, _| p.row(i).norm());
-            let error = match (flawed, sensor) {
-                (false, _) => Vector3::zeros(),
-                (_, 0) => Vector3::new(SAG * force.z, SAG * force.x, THERMAL * (temp_c(t) - 25.0)),
-                _ => Vector3::from_fn(|i, _| {
-                    CUBIC * (p.row(i).transpose().dot(&force) / scale[i]).powi(3)
-                }),
-            };
-            let read = p * *input + b + scale.component_mul(&error);
-            for u in &read {
-                let u = u + NOISE[sensor] * normal();
-                write!(out, ",{u:.9}").unwrap();
+        for (sensor, noise) in NOISE.iter().enumerate() {
+            for u in &read(sensor, t, &inputs) {
+                write!(out, ",{:.9}", u + noise * normal()).unwrap();
             }
         }
         for v in rate_dps.iter().chain(force.iter()) {
@@ -100,6 +96,25 @@ pub fn record(folder: &Path, flawed: bool, temp: bool) {
         out.push('\n');
     }
     std::fs::write(folder.join("samples.csv"), out).unwrap();
+}
+
+/// Records the unit on a table, with or without its flaws; `temp` says whether temp_c is recorded.
+pub fn record(folder: &Path, flawed: bool, temp: bool) {
+    let shown: &dyn Fn(f64) -> f64 = &temp_c;
+    let read = |sensor: usize, t: f64, inputs: &[Vector3<f64>; 2]| {
+        let (p, b) = forward(sensor);
+        let force = inputs[1];
+        let scale = Vector3::from_fn(|i, _| p.row(i).norm());
+        let error = match (flawed, sensor) {
+            (false, _) => Vector3::zeros(),
+            (_, 0) => Vector3::new(SAG * force.z, SAG * force.x, THERMAL * (temp_c(t) - 25.0)),
+            _ => Vector3::from_fn(|i, _| {
+                CUBIC * (p.row(i).transpose().dot(&force) / scale[i]).powi(3)
+            }),
+        };
+        p * inputs[sensor] + b + scale.component_mul(&error)
+    };
+    record_with(folder, 7 + u64::from(flawed), temp.then_some(shown), read);
 }
 
 pub fn prepared(folder: &Path) -> Prepared {

@@ -1,11 +1,11 @@
 //! `mimu wizard` with the firmware's release image on the emulated board, on a turntable and in hands that it commands. Killed, unplugged, garbled
 //! and disturbed sessions end with the right calibration or with a clear message, and never store a wrong one.
+
 use super::bench::{Bench, in_repository, unit};
 use crate::command::mimu;
 use mimu::calibration::Calibration;
 use mimu::quantity::Sensor;
 use mimu_rig::rig_file::RigTruth;
-use mimu_rig::rotation::Vector;
 
 /// Twelve dwells of a second that determine both triads, with little motion between them.
 fn short_plan(bench: &Bench) -> String {
@@ -25,37 +25,6 @@ fn short_plan(bench: &Bench) -> String {
     }
     std::fs::write(bench.path("plan.toml"), plan).unwrap();
     "plan.toml".into()
-}
-
-/// Largest error of the calibration over inputs of full size: gyro (rad/s at 60 deg/s), accelerometer.
-pub fn errors(calibration: &Calibration, truth: &RigTruth) -> [f64; 2] {
-    let unit = &truth.file.unit;
-    let affine = [
-        unit.gyro_affine.as_ref().unwrap(),
-        unit.accel_affine.as_ref().unwrap(),
-    ];
-    // The firmware measures the gyros against the reference pin of the first, assuming its nominal voltage.
-    let ratio = [2.5 / unit.gyro_reference_v.unwrap()[0], 1.0];
-    let size = [1.0, 9.793];
-    Sensor::BOTH.map(|sensor| {
-        let k = sensor as usize;
-        let inverse = calibration.inverse(sensor).unwrap();
-        let mut worst: f64 = 0.0;
-        for axis in 0..3 {
-            for sign in [1.0, -1.0, 0.0] {
-                let input: Vector =
-                    std::array::from_fn(|i| if i == axis { sign * size[k] } else { 0.0 });
-                let raw = nalgebra::Vector3::from_fn(|i, _| {
-                    let row = &affine[k].matrix[i];
-                    let sum: f64 = row.iter().zip(&input).map(|(m, x)| m * x).sum();
-                    ratio[k] * (sum + affine[k].bias[i])
-                });
-                let error = inverse.apply(&raw) - nalgebra::Vector3::from(input);
-                worst = worst.max(error.norm());
-            }
-        }
-        worst
-    })
 }
 
 /// The largest error of an entry of C and o of gyro and accelerometer, in halves of its 95 % interval.

@@ -1,4 +1,5 @@
 //! `mimu wizard` with a board of another maker, which writes lines of text into a pseudo-terminal; and its full screen.
+
 use std::fmt::Write as _;
 use std::path::Path;
 use std::process::Stdio;

@@ -48,10 +48,6 @@ impl Device {
             match act {
                 Some(Act::Restart) => return self.restart(),
                 Some(Act::Vanish) => self.port = None,
-                Some(Act::PowerCut { away_ms }) => {
-                    self.off_until = Some(Instant::now() + Duration::from_millis(away_ms));
-                    return;
-                }
                 Some(Act::Unplug { away_ms }) => {
                     if let Some(link) = &self.script.link {
                         std::fs::remove_file(link).unwrap();
