@@ -12,7 +12,9 @@ mod plan;
 #[path = "../../../../tests/thermal/points.rs"]
 mod points;
 mod refused;
+#[path = "../../../../tests/thermal/simulation.rs"]
 mod simulation;
+#[path = "../../../../tests/thermal/soak.rs"]
 mod soak;
 mod soaked;
 
