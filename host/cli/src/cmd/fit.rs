@@ -17,9 +17,9 @@ use mimu::result::sessions::SessionsResult;
 use mimu::sessions::class::PartClass;
 use mimu::sessions::{Sessions, fit_determined};
 use mimu::signal::stillness::DwellSearch;
+use mimu_recording::ReferenceError;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::stage;
-use mimu_recording::ReferenceError;
 use serde::Serialize;
 
 use crate::arguments::{
