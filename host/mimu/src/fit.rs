@@ -25,7 +25,7 @@ pub(crate) mod uncalibrated;
 use std::sync::Arc;
 
 use crate::estimate::least_squares::{POORLY_DETERMINED, Scatter};
-use crate::estimate::{Estimated, Failure, Observation, magnitude};
+use crate::estimate::{Estimated, Observation, magnitude};
 use crate::prepared::Prepared;
 use crate::prior::{FALSE_STRANGER, Prior};
 use crate::quantity::{Figure, Sensor};
@@ -456,12 +456,6 @@ fn tested(
             Test::of_scatter(&all, rows)
         }
     }
-}
-
-/// The error for a fit whose data cannot judge it.
-fn lost(prepared: &Prepared, sensor: Sensor) -> Error {
-    let seen = "the fit does not give back what it was fitted to".to_string();
-    prepared.refused(Failure::NoSolution(seen), sensor)
 }
 
 /// Refuses an accelerometer in g: known forces near 1, or readings in SI near 1 at rest.

@@ -88,7 +88,7 @@ pub enum Warning {
     #[error("the device restarted within it: {} its own biases, and those given are of the last", match .others { 1 => "the power-on before has".to_string(), n => format!("each of the {n} power-ons before has") })]
     PowerOns { others: usize },
     /// The bias of a sensor in a power-on beside the one that a calibration is judged in: from when on, s, by how much it is more, and half of the 95 % intervals, SI.
-    #[error(fmt = words::bias_moved)]
+    #[error("{}", words::bias_moved(*sensor, *t_s, moved, half_width))]
     BiasMoved {
         sensor: Sensor,
         t_s: f64,
@@ -112,7 +112,7 @@ pub enum Warning {
         row: u64,
     },
     /// Rows that repeat the row before.
-    #[error(fmt = words::repeated)]
+    #[error("{} the row before, time included: left out", match rows { 1 => "1 row repeats".to_owned(), n => format!("{n} rows repeat") })]
     Repeated { rows: u64 },
     /// Samples of a channel that are empty or not a number.
     #[error("{} of {channel} empty or not a number: masked", plural(*.count, "sample"))]
@@ -134,7 +134,7 @@ pub enum Warning {
         found_dps: Option<f64>,
     },
     /// Dwells that are not used, and why: for both sensors alike or for one.
-    #[error(fmt = words::dwells_not_used)]
+    #[error("{}", words::not_used(dwells, fault, *sensor))]
     DwellsNotUsed {
         dwells: Vec<String>,
         fault: Fault,
@@ -154,14 +154,14 @@ pub enum Warning {
         effect: String,
     },
     /// Gravity that no height explains, m/s², and the latitude, degrees.
-    #[error(fmt = words::gravity)]
+    #[error("{}", words::gravity(*gravity_mps2, *latitude_deg))]
     Gravity {
         gravity_mps2: f64,
         latitude_deg: f64,
     },
     /// Gravity of the calibration and of the recording, m/s²; the mean magnitude of the calibrated force at rest, and whether it agrees with the
     /// former.
-    #[error(fmt = words::other_gravity)]
+    #[error("{}", words::other_gravity(*gravity_mps2, *force_mps2, *contradicted))]
     OtherGravity {
         gravity_mps2: [f64; 2],
         force_mps2: f64,
@@ -208,7 +208,7 @@ pub enum Warning {
     )]
     MeansOfTurns,
     /// Range of temperatures that the model of both sensors or of one lacks, °C.
-    #[error(fmt = words::without_temperature)]
+    #[error("the dwells range from {low_c:.1} to {high_c:.1} °C, but {} does not depend on temperature", words::model(*sensor))]
     WithoutTemperature {
         low_c: f64,
         high_c: f64,
@@ -252,7 +252,7 @@ pub enum Warning {
     DwellLeftOut { dwell: i32, error: f64, sigmas: f64 },
     /// A dwell that is kept for the accelerometer though it is suspect: its error, m/s², the parameter that the others hardly determine,
     /// and how many times as wide its interval would be without the dwell.
-    #[error(fmt = words::dwell_kept)]
+    #[error("dwell {dwell} is kept for the accelerometer, although {}: {}, so it cannot be tested; repeat its pose", match error.is_finite() { true => off(*error), false => "it is suspect".into() }, open(parameter, *wider))]
     DwellKept {
         dwell: i32,
         error: f64,
@@ -328,7 +328,10 @@ pub enum Warning {
         wider: f64,
     },
     /// A turn that cannot be integrated: by the fault of a channel, or because samples are missing.
-    #[error(fmt = words::turn_not_used)]
+    #[error(
+        "the turn from dwell {from} to {to} is not used: {}",
+        words::turn_fault(fault)
+    )]
     TurnNotUsed {
         from: i32,
         to: i32,
@@ -368,10 +371,10 @@ pub enum Warning {
     )]
     WithTurns,
     /// A given matrix, and whether its intervals are known.
-    #[error(fmt = words::matrix_given)]
+    #[error("the matrix {}", match with_intervals { true => "and its intervals are given; the biases are those of this recording, and the intervals include both uncertainties", false => "is given without intervals, so no interval includes its error; the biases are those of this recording" })]
     MatrixGiven { with_intervals: bool },
     /// Parts of a recording (blocks or not) that cannot be held out, and why the first cannot.
-    #[error(fmt = words::not_held_out)]
+    #[error("{}", words::not_held_out(*blocks, parts, why))]
     NotHeldOut {
         blocks: bool,
         parts: Vec<usize>,
@@ -381,7 +384,7 @@ pub enum Warning {
     #[error("one dwell in {one_in} is held out instead of blocks: {why}")]
     Interleaved { one_in: usize, why: Box<Warning> },
     /// Number of parameters that leaving out dwells or turns changes, of all parameters, and the largest changes.
-    #[error(fmt = words::left_out_changes)]
+    #[error("{}", words::left_out_changes(*changed, *of, largest))]
     LeftOutChanges {
         changed: usize,
         of: usize,
@@ -389,7 +392,7 @@ pub enum Warning {
     },
     /// Errors of the uncalibrated and the calibrated readings, and their unit; whether the latter are held out; their number if they do not
     /// decide.
-    #[error(fmt = words::no_better)]
+    #[error("the error of the uncalibrated readings is {} {unit}, that of the calibrated ones {} {unit} {}: {}", significant(errors[0]), significant(errors[1]), if *held_out { "on held-out data" } else { "in sample" }, words::improves(*undecided))]
     NoBetter {
         errors: [f64; 2],
         unit: &'static str,
@@ -397,21 +400,21 @@ pub enum Warning {
         undecided: Option<usize>,
     },
     /// Directions without a pose nearby, and the errors there and in the poses, m/s².
-    #[error(fmt = words::unseen_poses)]
+    #[error("no pose is near {} up, where the calibration is uncertain by {} mm/s² (one sigma); in the recorded poses it is {} mm/s². Add such poses before you use it there", directions.join(", "), significant(1e3 * worst), significant(1e3 * typical))]
     UnseenPoses {
         directions: Vec<String>,
         worst: f64,
         typical: f64,
     },
     /// Shares of the readings that models without and with temperature leave unexplained, and the mean temperature, °C.
-    #[error(fmt = words::follows_temperature)]
+    #[error("a model without temperature leaves {} % of the readings unexplained, one with temperature {} %. The parameters are valid at about {mean_c:.1} °C, the mean of the dwells, and their intervals include the effect of temperature; `mimu diagnose` finds this effect", significant(100.0 * without), significant(100.0 * with))]
     FollowsTemperature {
         without: f64,
         with: f64,
         mean_c: f64,
     },
     /// Dwells, or else turns, that are outliers; the largest error, its unit, and its ratio to the median.
-    #[error(fmt = words::outliers)]
+    #[error("{} ({} {}): errors of up to {} {unit}, {times:.0} times the median; look for the cause, because they widen all intervals", plural(names.len() as u64, "outlier"), if *turns { "turn to dwell" } else { "dwell" }, words::few(names), significant(*worst))]
     Outliers {
         turns: bool,
         names: Vec<String>,
@@ -420,7 +423,7 @@ pub enum Warning {
         times: f64,
     },
     /// Rates of the turntable, deg/s, and the error of each, as a share of it.
-    #[error(fmt = words::rate_error)]
+    #[error("{}", words::rate_error(rates_dps, *share))]
     RateError { rates_dps: Vec<f64>, share: f64 },
     /// Rate of the turntable, rad/s, that the other rates contradict, and the share by which the fit moves it.
     #[error("the rates of the turntable contradict each other: by the fit, {} deg/s is {:+.2} % off; check the rates (33 1/3 rpm is 200 deg/s, 45 rpm is 270 deg/s) and their error", significant(.rate.to_degrees()), 100.0 * .off)]
@@ -431,7 +434,7 @@ pub enum Warning {
     )]
     NoRestsToFit { why: String },
     /// Angle between the axes and those that they are referred to, rad, and whether these are the table's.
-    #[error(fmt = words::turned)]
+    #[error("its axes are rotated by {:.0} degrees relative to {}: unless it is mounted so, columns are swapped or have the wrong sign", angle.to_degrees(), if *to_table { "those of the ref_ columns" } else { "the accelerometer's" })]
     Turned { angle: f64, to_table: bool },
     /// Angle by which the dwells appear to be off level, rad rms.
     #[error("the errors are perpendicular to the known force, as if the dwells were off level by {} deg rms: level the faces, or use only the magnitude of gravity (reference = \"gravity\")", degrees(*.angle))]
@@ -449,14 +452,14 @@ pub enum Warning {
         recording: String,
     },
     /// Whether the calibration and the recording name no unit.
-    #[error(fmt = words::unnamed_unit)]
+    #[error("{}, so they are taken to belong to one; to have this checked, give each import the name of its unit", words::unnamed(*unnamed))]
     UnnamedUnit { unnamed: [bool; 2] },
     /// The calibration was made from the recording.
     #[error("the calibration was made from this recording: the figures say nothing about new data")]
     SameRecording,
     /// Samples outside the temperatures of the calibration, of so many; the range, °C; the farthest, K; whether there are curves, and
     /// how far they reach beyond it, K.
-    #[error(fmt = words::out_of_range)]
+    #[error("{} of {} samples are outside the {:.1} to {:.1} °C that the calibration was made from, by up to {farthest_k:.1} K: {}", samples[0], samples[1], range_c[0], range_c[1], words::beyond(*beyond_k))]
     OutOfRange {
         samples: [u64; 2],
         range_c: [f64; 2],
@@ -472,11 +475,11 @@ pub enum Warning {
     #[error("the recording has no data to judge it")]
     NothingToJudge,
     /// Worse than the uncalibrated readings, or else than their mean scale factor and bias.
-    #[error(fmt = words::worse)]
+    #[error("worse than with {}: is it the calibration of this unit{}?", words::without(*readings_in_si), if *readings_in_si { "" } else { ", in this state" })]
     Worse { readings_in_si: bool },
     /// The errors do not show whether the calibration is better. Their number; whether they are of turns (else of dwells); what they are compared with, as
     /// in [`Self::Worse`].
-    #[error(fmt = words::undecided)]
+    #[error("{} do not show whether it is better than {}: record more", plural(*errors, if *turns { "turn" } else { "dwell" }), words::without(*readings_in_si))]
     Undecided {
         errors: u64,
         turns: bool,
@@ -491,7 +494,7 @@ pub enum Warning {
     )]
     Uncertain,
     /// A recording that cannot judge the calibration, with its name if there are several, and why.
-    #[error(fmt = words::not_judged)]
+    #[error("{}{why}", match recording { Some(recording) => format!("{recording} cannot judge the calibration: "), None => String::new() })]
     NotJudged {
         recording: Option<String>,
         why: Error,
@@ -525,7 +528,7 @@ pub enum Warning {
         first_s: f64,
     },
     /// Windows in which the unit moves, of so many; their length, s; the first instant, s, and the channel.
-    #[error(fmt = words::moves)]
+    #[error("{}", words::moves(*windows, *window_s, *first_s, channel))]
     Moves {
         windows: [usize; 2],
         window_s: f64,

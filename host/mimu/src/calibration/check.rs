@@ -1,9 +1,9 @@
 //! Checks whether a calibration file can be applied.
 
 use mimu_core::compensation::{Affine, Implausible};
-use mimu_core::table::{TEMPERATURE_RANGE_C, is_temperature};
 use nalgebra::{Matrix3, Vector3};
 
+use super::over_temperature::{problem_of_range, problem_of_temperature};
 use super::{
     Calibration, FORMAT, FORMAT_OF_CURVES, FORMULA, INVERSE_DIRECTION, TriadTable, effect,
 };
@@ -125,18 +125,12 @@ impl Calibration {
             let place = format!("{place}, [recording]");
             Err(Error::new(place, problem, "fit the recording again"))
         };
-        let [least, most] = TEMPERATURE_RANGE_C;
-        if let Some([from, to]) = self.recording.temp_range_c
-            && !(is_temperature(from) && is_temperature(to) && from <= to)
-        {
-            return refuse(format!(
-                "temp_range_c is [{from}, {to}]; it has to increase, from {least} °C at least to {most} °C at most"
-            ));
-        }
-        if let Some(temp_c) = self.recording.temp_c.filter(|t| !is_temperature(*t)) {
-            return refuse(format!(
-                "temp_c is {temp_c}; it has to be from {least} to {most} °C"
-            ));
+        let of = &self.recording;
+        let range = of.temp_range_c;
+        let problem = range.and_then(|range| problem_of_range("temp_range_c", range));
+        let problem = problem.or_else(|| problem_of_temperature(of.temp_c?));
+        if let Some(problem) = problem {
+            return refuse(problem);
         }
         match &self.temperature {
             None => Ok(()),

@@ -115,6 +115,22 @@ pub struct Curves {
     has: PerSensor<bool>,
 }
 
+/// What is wrong with a range of temperatures, °C, that has this `name` in a file.
+pub(super) fn problem_of_range(name: &str, [from, to]: [f64; 2]) -> Option<String> {
+    let [least, most] = TEMPERATURE_RANGE_C;
+    let right = is_temperature(from) && is_temperature(to) && from <= to;
+    (!right).then(|| format!(
+        "{name} is [{from}, {to}]; it has to increase, from {least} °C at least to {most} °C at most"
+    ))
+}
+
+/// What is wrong with a temperature, °C.
+pub(super) fn problem_of_temperature(temp_c: f64) -> Option<String> {
+    let [least, most] = TEMPERATURE_RANGE_C;
+    (!is_temperature(temp_c))
+        .then(|| format!("temp_c is {temp_c}; it has to be from {least} to {most} °C"))
+}
+
 /// Index of the node that represents a calibration if there can be only one model, from the `temperatures` of the nodes, °C. It is nearest to the
 /// temperature from which effects count, so it follows from what a device stores. `None` if there are no nodes.
 pub fn reference_node(temperatures: &[f64]) -> Option<usize> {
@@ -197,14 +213,8 @@ impl OverTemperature {
             ))
         };
         let [from, to] = self.range_c;
-        let [least, most] = TEMPERATURE_RANGE_C;
-        if !(is_temperature(from) && is_temperature(to) && from <= to) {
-            let problem = format!(
-                "range_c is [{from}, {to}]; it has to increase, from {least} °C at least to {most} °C at most"
-            );
-            return refuse("", problem);
-        }
-        if let Some(problem) = self.problem_of_lags() {
+        let problem = problem_of_range("range_c", self.range_c);
+        if let Some(problem) = problem.or_else(|| self.problem_of_lags()) {
             return refuse("", problem);
         }
         let all = [self.dies.gyro.hysteresis, self.dies.accel.hysteresis];
@@ -272,11 +282,8 @@ impl OverTemperature {
         has: PerSensor<bool>,
     ) -> Option<String> {
         let temp_c = node.temp_c;
-        if !is_temperature(temp_c) {
-            let [least, most] = TEMPERATURE_RANGE_C;
-            return Some(format!(
-                "temp_c is {temp_c}; it has to be from {least} to {most} °C"
-            ));
+        if let Some(problem) = problem_of_temperature(temp_c) {
+            return Some(problem);
         }
         if let Some(before) = before.filter(|before| temp_c <= *before) {
             return Some(format!(

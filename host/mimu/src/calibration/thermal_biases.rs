@@ -6,10 +6,11 @@
 
 use mimu_core::compensation::{Affine, Compensation};
 use mimu_core::stored::NODES;
-use mimu_core::table::{Node, TEMPERATURE_RANGE_C, Table, is_temperature};
+use mimu_core::table::{Node, Table};
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
+use super::over_temperature::{problem_of_range, problem_of_temperature};
 use super::{DieTable, Origin};
 use crate::judgement::Judgement;
 use crate::quantity::{PerSensor, Sensor};
@@ -229,23 +230,16 @@ impl ThermalBiases {
             let remedy = "use the version of mimu that wrote it";
             return Err(Error::new(place, problem, remedy));
         }
-        let [least, most] = TEMPERATURE_RANGE_C;
-        let [from, to] = self.range_c;
-        if !(is_temperature(from) && is_temperature(to) && from <= to) {
-            return refuse(format!(
-                "range_c is [{from}, {to}]; it has to increase within {least} to {most} °C"
-            ));
+        if let Some(problem) = problem_of_range("range_c", self.range_c) {
+            return refuse(problem);
         }
         if !(self.has(Sensor::Gyro) || self.has(Sensor::Accel)) {
             return refuse("no node has a reading of gyro or accel".into());
         }
         for (k, node) in self.nodes.iter().enumerate() {
             let number = k + 1;
-            if !is_temperature(node.temp_c) {
-                let temp_c = node.temp_c;
-                return refuse(format!(
-                    "temp_c of node {number} is {temp_c}; it has to be from {least} to {most} °C"
-                ));
+            if let Some(problem) = problem_of_temperature(node.temp_c) {
+                return refuse(format!("node {number}: {problem}"));
             }
             for sensor in Sensor::BOTH {
                 let reading = node.reading(sensor);

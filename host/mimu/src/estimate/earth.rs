@@ -40,6 +40,15 @@ impl Earth {
         }
     }
 
+    /// The known part of the rate, and the standard deviations of the rest, rad/s: z is the vertical, x and y are fixed to the ground in an unknown direction.
+    pub fn on_the_ground(&self) -> [Vector3<f64>; 2] {
+        let [level, up] = [self.level, self.vertical_error].map(f64::sqrt);
+        [
+            Vector3::new(0.0, 0.0, self.vertical),
+            Vector3::new(level, level, up),
+        ]
+    }
+
     /// The known part of what a gyro at rest reads, rad/s, if the specific force points along `up` (body axes, any length).
     pub fn rate(&self, up: &Vector3<f64>) -> Vector3<f64> {
         unit(up).map_or_else(Vector3::zeros, |up| up * self.vertical)

@@ -10,14 +10,13 @@
 //! squares with that covariance estimates them together with the parameters. Where the heading is lost, other unknown numbers begin. A dwell by
 //! itself then has two of its own, whose size goes into the intervals.
 
-use std::f64::consts::FRAC_1_SQRT_2;
 use std::ops::Range;
 
 use mimu_core::compensation::Affine;
 use mimu_recording::Manifest;
 use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
 
-use super::earth::RATE;
+use super::earth::{Earth, poses};
 use crate::quantity::Sensor;
 use crate::signal::blocks::{Block, Condensed};
 use crate::signal::dwell::{Dwell, Dwells};
@@ -31,8 +30,6 @@ const FOLLOWED: f64 = 0.087;
 const MISSING: f64 = 0.035;
 /// Slower than this, rad/s, a unit is at rest; five times the Earth's rate.
 const AT_REST: f64 = 0.02;
-/// Two poses count as one if the angle between their verticals is less than this, rad.
-const ONE_POSE: f64 = 0.05;
 
 /// The Earth's rate in an observation; by default none.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -142,21 +139,30 @@ impl EarthOnTable {
         let ups: Vec<Option<Vector3<f64>>> = dwells.list.iter().map(|d| path.up(d)).collect();
         // Without a vertical the direction of the Earth's rate is unknown altogether.
         let by_force = ups.iter().any(Option::is_some);
-        let prior = Prior::of(manifest.latitude_deg.filter(|_| by_force));
+        let earth = Earth::at(manifest.latitude_deg.filter(|_| by_force));
+        let [known, sigma] = earth.on_the_ground();
+        // In a body with this attitude, body to ground.
+        let rate = |attitude: &Rotation3<f64>| {
+            let to_body = attitude.inverse();
+            Rate {
+                known: to_body * known,
+                by: to_body.matrix() * Matrix3::from_diagonal(&sigma),
+            }
+        };
         let in_dwell = |i: usize| {
             let dwell = &dwells.list[i];
             let start = attitudes[i];
             let each = path.through(dwell, &start);
             let mut mean = Rate::ZERO;
             for (attitude, share) in &each {
-                mean.add(&prior.rate(attitude), *share);
+                mean.add(&rate(attitude), *share);
             }
             if path.means {
                 mean.over_whole_turns(dwell);
             }
             let turns = each.windows(2).any(|pair| pair[0].0 != pair[1].0);
             let blocks = match turns {
-                true => each.iter().map(|(a, _)| prior.rate(a)).collect(),
+                true => each.iter().map(|(a, _)| rate(a)).collect(),
                 false => Vec::new(),
             };
             InDwell {
@@ -193,41 +199,6 @@ impl EarthOnTable {
             sum.add(of.blocks.get(k).unwrap_or(&of.mean), *weight);
         }
         sum.with_heading(of.heading)
-    }
-}
-
-/// What is known of the Earth's rate on the ground: z is the vertical, x and y are fixed to the ground in an unknown direction.
-struct Prior {
-    known: Vector3<f64>,
-    sigma: Vector3<f64>,
-}
-
-impl Prior {
-    /// At a latitude, degrees. Without one, each component has the mean square of a direction on a sphere.
-    fn of(latitude_deg: Option<f64>) -> Self {
-        match latitude_deg {
-            Some(degrees) => {
-                let (sin, cos) = degrees.to_radians().sin_cos();
-                let level = RATE * cos * FRAC_1_SQRT_2;
-                Self {
-                    known: Vector3::new(0.0, 0.0, RATE * sin),
-                    sigma: Vector3::new(level, level, 0.0),
-                }
-            }
-            None => Self {
-                known: Vector3::zeros(),
-                sigma: Vector3::repeat(RATE / 3f64.sqrt()),
-            },
-        }
-    }
-
-    /// The rate in a body with this attitude, body to ground.
-    fn rate(&self, attitude: &Rotation3<f64>) -> Rate {
-        let to_body = attitude.inverse();
-        Rate {
-            known: to_body * self.known,
-            by: to_body.matrix() * Matrix3::from_diagonal(&self.sigma),
-        }
     }
 }
 
@@ -302,20 +273,10 @@ impl Path<'_> {
         let single: Vec<usize> = (0..headings.len())
             .filter(|k| alone(*k, headings))
             .collect();
-        let mut leaders: Vec<(usize, Vector3<f64>)> = Vec::new();
-        for k in single {
-            let Some(up) = self.up(&self.dwells.list[k]) else {
-                continue;
-            };
-            match leaders
-                .iter()
-                .find(|(_, other)| other.angle(&up) < ONE_POSE)
-            {
-                Some((leader, _)) => {
-                    (attitudes[k], headings[k]) = (attitudes[*leader], headings[*leader]);
-                }
-                None => leaders.push((k, up)),
-            }
+        let up = |k: &usize| Some((*k, self.up(&self.dwells.list[*k])?));
+        let (dwells, ups): (Vec<usize>, Vec<Vector3<f64>>) = single.iter().filter_map(up).unzip();
+        for (k, leader) in dwells.iter().zip(poses(&ups)) {
+            (attitudes[*k], headings[*k]) = (attitudes[dwells[leader]], headings[dwells[leader]]);
         }
     }
 

@@ -33,7 +33,7 @@ pub struct KnownMagnitudes<'a> {
     pub levels: &'a [f64],
     /// Relative standard deviation of each level, an error that all its observations share; 0: exact.
     pub level_sigma: f64,
-    /// Index of the level of each observation.
+    /// Index of the level of each observation; empty if there is one level.
     pub level_of: &'a [usize],
     /// Dwells whose input vector is known, such as a gyro at rest.
     pub rests: &'a [Rest],
@@ -137,27 +137,33 @@ pub fn first_guess(observations: &[Observation], gravity: f64) -> Option<Affine<
 
 /// The same for several magnitudes: one scale factor for all axes, by the spheres through the readings and the rests at their centre.
 pub fn rough(observations: &[Observation], known: &KnownMagnitudes) -> Option<Affine<f64>> {
-    let unit = known.levels.iter().copied().fold(0.0, f64::max);
-    let shares: Vec<f64> = known
-        .level_of
-        .iter()
-        .map(|l| known.levels[*l] / unit)
-        .collect();
+    let (unit, shares) = known.shares(observations.len());
     Some(Sphere::through(observations, &shares, known.rests)?.model(unit))
 }
 
 impl<'a> KnownMagnitudes<'a> {
-    /// Of an accelerometer: `gravity`, m/s², in one power-on. `level_of` are as many zeros as observations.
-    pub fn gravity(gravity: &'a f64, level_of: &'a [usize]) -> Self {
+    /// Of an accelerometer: `gravity`, m/s².
+    fn gravity(gravity: &'a f64, prior: Option<&'a TriadPrior>, power_ons: &'a PowerOns) -> Self {
         Self {
             sensor: Sensor::Accel,
             levels: std::slice::from_ref(gravity),
             level_sigma: 0.0,
-            level_of,
+            level_of: &[],
             rests: &[],
-            prior: None,
-            power_ons: PowerOns::ONE,
+            prior,
+            power_ons,
         }
+    }
+
+    fn level(&self, observation: usize) -> usize {
+        self.level_of.get(observation).copied().unwrap_or(0)
+    }
+
+    /// The largest level, and the magnitudes of so many observations over it.
+    fn shares(&self, count: usize) -> (f64, Vec<f64>) {
+        let unit = self.levels.iter().copied().fold(0.0, f64::max);
+        let share = |k| self.levels[self.level(k)] / unit;
+        (unit, (0..count).map(share).collect())
     }
 }
 
@@ -169,12 +175,7 @@ pub fn by_gravity(
     prior: Option<&TriadPrior>,
     power_ons: &PowerOns,
 ) -> Result<Estimated, Failure> {
-    let level_of = vec![0; observations.len()];
-    let known = KnownMagnitudes {
-        prior,
-        power_ons,
-        ..KnownMagnitudes::gravity(&gravity, &level_of)
-    };
+    let known = KnownMagnitudes::gravity(&gravity, prior, power_ons);
     estimate(observations, variances, &known)
 }
 
@@ -188,11 +189,7 @@ pub fn bias_steps(
     gravity: f64,
     power_ons: &PowerOns,
 ) -> Result<Vec<Vector3<f64>>, Failure> {
-    let level_of = vec![0; observations.len()];
-    let known = KnownMagnitudes {
-        power_ons,
-        ..KnownMagnitudes::gravity(&gravity, &level_of)
-    };
+    let known = KnownMagnitudes::gravity(&gravity, None, power_ons);
     refuse_too_little(observations, &known)?;
     let by = ByMagnitudes::of(observations, variances, &known)?;
     let solved = by.fit.solve(by.solved()?, &|_, _| 0.0, &|_| Ok(()))?;
@@ -282,9 +279,7 @@ impl<'a> ByMagnitudes<'a> {
         variances: &[f64],
         known: &'a KnownMagnitudes<'a>,
     ) -> Result<Self, Failure> {
-        let unit = known.levels.iter().copied().fold(0.0, f64::max);
-        let level_of = known.level_of.iter();
-        let shares: Vec<f64> = level_of.map(|l| known.levels[*l] / unit).collect();
+        let (unit, shares) = known.shares(observations.len());
         let middle = known.prior.and_then(TriadPrior::middle);
         let sphere = match middle.as_ref().and_then(Forward::of) {
             // Few poses may be on many spheres.
@@ -301,8 +296,9 @@ impl<'a> ByMagnitudes<'a> {
         // A reading at the end of the range has no noise, and would be believed against all others.
         let floor = 1e-12 * variances.iter().copied().fold(0.0, f64::max);
         let mut factors = Factors::default();
-        for ((o, level), variance) in observations.iter().zip(known.level_of).zip(variances) {
-            let magnitude = (known.levels[*level], err.then_some(*level));
+        for (k, (o, variance)) in observations.iter().zip(variances).enumerate() {
+            let level = known.level(k);
+            let magnitude = (known.levels[level], err.then_some(level));
             let variance = variance.max(floor);
             factors.magnitude(known.sensor, (o.dwell, o.raw), magnitude, variance);
         }

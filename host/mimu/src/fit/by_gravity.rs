@@ -7,7 +7,7 @@ use super::determined::{faces_not_up, unseen_poses};
 use super::hold_out::Split;
 use super::judged::{InSample, Parts, Refit};
 use super::sensor::SensorFit;
-use super::{Fit, Options, finish, lost, refuse_wrong_gravity};
+use super::{Fit, Options, finish, refuse_wrong_gravity};
 use crate::estimate::rotation::Data;
 use crate::estimate::with_turns::JointFit;
 use crate::estimate::{Estimated, Failure, Observation, magnitude, rotation};
@@ -60,8 +60,7 @@ pub(super) fn fit_gravity(
         accel: Some(accel.triad.inverse),
     };
     let with = |models: &Models| Judging::of(prepared, Sensor::Accel, models);
-    let in_sample = with(&models).and_then(|judging| InSample::of(judging, models, parts));
-    let in_sample = in_sample.ok_or_else(|| lost(prepared, Sensor::Accel))?;
+    let in_sample = InSample::of(prepared, Sensor::Accel, &with, models, parts)?;
     let errors = &in_sample.errors;
     let refit = |split: Split, part: usize| {
         let kept = |dwell: usize| parts.of(split, dwell) != part;
@@ -69,9 +68,7 @@ pub(super) fn fit_gravity(
         let refit = Refit::of_one(Sensor::Accel, accel.triad.clone(), ByTriad::zeros());
         Ok((accel, errors.checked(refit, split, part)?))
     };
-    let judged = in_sample.held_out(&with, prepared.is_in_si(), |split, part| {
-        Ok(refit(split, part)?.1)
-    });
+    let judged = in_sample.held_out(|split, part| Ok(refit(split, part)?.1));
     let mut sensors = Vec::new();
     // A table of means has no turns; its warnings say so.
     if prepared.has(Sensor::Gyro) && options.wants(Sensor::Gyro) && !prepared.manifest.means {
@@ -485,10 +482,9 @@ fn fit_turns(
         accel: Some(*by_full),
     };
     let with = |models: &Models| Judging::of(prepared, Sensor::Gyro, models);
-    let in_sample = with(&models).and_then(|judging| InSample::of(judging, models, parts));
-    let in_sample = in_sample.ok_or_else(|| lost(prepared, Sensor::Gyro))?;
+    let in_sample = InSample::of(prepared, Sensor::Gyro, &with, models, parts)?;
     let errors = &in_sample.errors;
-    let judged = in_sample.held_out(&with, prepared.is_in_si(), |split, part| {
+    let judged = in_sample.held_out(|split, part| {
         let without = (parts, accel_without);
         let refit = refit(prepared, &data, &gyro, without, (split, part))?;
         errors.checked(refit, split, part)

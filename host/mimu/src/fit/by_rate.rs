@@ -7,7 +7,7 @@ use mimu_core::compensation::Affine;
 use super::by_gravity::fit_gravity;
 use super::judged::{InSample, Parts, Refit};
 use super::sensor::SensorFit;
-use super::{Options, finish, lost};
+use super::{Options, finish};
 use crate::estimate::magnitude::{self, KnownMagnitudes};
 use crate::estimate::{Estimated, Failure, Observation};
 use crate::judging::{Judging, Models};
@@ -90,9 +90,8 @@ fn fit_gyro(prepared: &Prepared, dwells: &RatedDwells, options: Options) -> Resu
     let count = options.holdout_blocks.min(dwells.turning.len());
     let parts = Parts::new(count, prepared.dwells.list.len());
     let with = |models: &Models| Judging::rated(prepared, dwells, models);
-    let in_sample = with(&models).and_then(|judging| InSample::of(judging, models, parts));
-    let in_sample = in_sample.ok_or_else(|| lost(prepared, Sensor::Gyro))?;
-    let judged = in_sample.held_out(&with, prepared.is_in_si(), |split, part| {
+    let in_sample = InSample::of(prepared, Sensor::Gyro, &with, models, parts)?;
+    let judged = in_sample.held_out(|split, part| {
         let refit = estimate(&|dwell| parts.of(split, dwell) != part)?.triad;
         // The error of the rates is common to kept and held-out dwells, so no refit is judged by it.
         let all = vector(&refit.inverse.matrix, &refit.inverse.offset);

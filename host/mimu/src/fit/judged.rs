@@ -8,9 +8,11 @@ use super::sensor::{Residual, typical};
 use crate::estimate::{Estimated, Failure};
 use crate::judging::{Both, Judging, Models, rms};
 use crate::observation::ByTriad;
+use crate::prepared::Prepared;
 use crate::quantity::{Figure, Sensor};
 use crate::triad::Triad;
 use crate::unseen::Unseen;
+use mimu_recording::error::Error;
 
 /// The parts of a recording: how many, and which a dwell belongs to.
 #[derive(Clone, Copy)]
@@ -89,10 +91,15 @@ pub(super) struct Judged {
 
 /// The errors of a fit in sample.
 pub(super) struct InSample<'a> {
+    prepared: &'a Prepared,
+    with: With<'a>,
     judging: Judging<'a>,
     models: Models,
     pub errors: Errors,
 }
+
+/// What judges by given models, with their noise.
+type With<'a> = &'a dyn Fn(&Models) -> Option<Judging<'a>>;
 
 /// Errors in sample, by which refits are checked, side by side.
 pub(super) struct Errors {
@@ -116,8 +123,24 @@ impl Errors {
 }
 
 impl<'a> InSample<'a> {
-    /// By the `models` of the fit. `None` without any.
-    pub fn of(judging: Judging<'a>, models: Models, parts: Parts) -> Option<Self> {
+    /// By the `models` of the fit.
+    ///
+    /// # Errors
+    /// Nothing judges them.
+    pub fn of(
+        prepared: &'a Prepared,
+        sensor: Sensor,
+        with: With<'a>,
+        models: Models,
+        parts: Parts,
+    ) -> Result<Self, Error> {
+        let seen = "the fit does not give back what it was fitted to";
+        let lost = || prepared.refused(Failure::NoSolution(seen.into()), sensor);
+        Self::by(prepared, with, models, parts).ok_or_else(lost)
+    }
+
+    fn by(prepared: &'a Prepared, with: With<'a>, models: Models, parts: Parts) -> Option<Self> {
+        let judging = with(&models)?;
         let errors = judging.errors(&models)?.into_iter();
         let each = errors.zip(judging.floors(&models)?).zip(judging.dwells());
         let residuals: Vec<Residual> = each
@@ -137,18 +160,17 @@ impl<'a> InSample<'a> {
             residuals,
         };
         Some(Self {
+            prepared,
+            with,
             judging,
             models,
             errors,
         })
     }
 
-    /// The errors with those of data that were held out, by a `refit` without each part. `with` gives what judges by other models, with their noise. `in_si`: whether
-    /// the readings are an output.
+    /// The errors with those of data that were held out, by a `refit` without each part.
     pub fn held_out(
         &self,
-        with: &dyn Fn(&Models) -> Option<Judging<'a>>,
-        in_si: bool,
         refit: impl Fn(Split, usize) -> Result<Refit, Failure> + Sync + Send,
     ) -> Judged {
         let (judging, parts) = (&self.judging, self.errors.parts);
@@ -169,7 +191,7 @@ impl<'a> InSample<'a> {
             };
             unseen.extend(match judging.figure {
                 Figure::Direction => of(judging),
-                _ => with(&refit.models).as_ref().and_then(of),
+                _ => (self.with)(&refit.models).as_ref().and_then(of),
             });
         }
         let rests = judging.rests.iter().filter_map(|rest| {
@@ -179,6 +201,7 @@ impl<'a> InSample<'a> {
         let rests: Vec<Vector3<f64>> = rests.collect();
         let held_at_rest = (!rests.is_empty()).then(|| rms(Figure::Input, rests.into_iter()));
         let at_rest = self.models.gyro.and_then(|gyro| judging.at_rest(&gyro));
+        let in_si = self.prepared.is_in_si();
         let one = Models::both(Some(Affine::identity()));
         let uncalibrated = || Some(judging.rms(&judging.errors(&one)?));
         Judged {

@@ -13,7 +13,7 @@ use super::by_gravity::{POOR_POSES, by_turns};
 use crate::estimate::rotation::Data;
 use crate::estimate::{Estimated, Observation, magnitude};
 use crate::factor::Factors;
-use crate::observation::{ALL, LOWER};
+use crate::observation::{ALL, LOWER, place};
 use crate::prepared::Prepared;
 use crate::quantity::{AXES, Sensor};
 use crate::signal::blocks::quantile;
@@ -60,61 +60,96 @@ impl Outlying {
     pub fn with_all(self) -> Option<Triad> {
         self.with_all.filter(|_| !self.left_out.is_empty())
     }
+
+    /// Those of `found` that the user does not keep; `ends` gives the first and last dwell of a row.
+    fn of(
+        prepared: &Prepared,
+        sensor: Sensor,
+        (found, with_all): (Vec<Judged>, Triad),
+        ends: impl Fn(usize) -> [usize; 2],
+    ) -> Self {
+        let mut out = Self {
+            with_all: Some(with_all),
+            ..Self::default()
+        };
+        for judged in found {
+            let [from, to] = ends(judged.row);
+            let steps = [from, to].map(|dwell| prepared.dwells.list[dwell].step);
+            if prepared.dwells.keep.keeps(steps[1]) {
+                continue;
+            }
+            if !judged.can_be_spared() {
+                out.warnings.push(kept(sensor, steps, &judged));
+                continue;
+            }
+            // A turn that is left out is named among those that are not used.
+            out.warnings
+                .extend((sensor == Sensor::Accel).then_some(Warning::DwellLeftOut {
+                    dwell: steps[1],
+                    error: judged.error,
+                    sigmas: judged.sigmas,
+                }));
+            out.left_out.push(LeftOut {
+                sensor,
+                from,
+                to,
+                error: judged.error,
+                sigmas: judged.sigmas,
+            });
+        }
+        out
+    }
 }
 
-/// Whether anything may be left out: gravity is the only reference, and the user did not keep everything.
-fn applies(prepared: &Prepared) -> bool {
-    prepared.has(Sensor::Accel) && !prepared.dwells.keep.everything()
+/// The warning about a dwell or a turn that cannot be spared.
+fn kept(sensor: Sensor, [from, to]: [i32; 2], judged: &Judged) -> Warning {
+    let (parameter, wider) = judged.grows;
+    match sensor {
+        Sensor::Accel => Warning::DwellKept {
+            dwell: to,
+            error: judged.error,
+            parameter: ACCEL_PARAMETERS[parameter],
+            wider,
+        },
+        Sensor::Gyro => Warning::TurnKept {
+            from,
+            to,
+            parameter: match place(parameter) {
+                (row, Some(column)) => format!("C_{}{} of the gyro", AXES[row], AXES[column]),
+                (axis, None) => format!("the bias of gyro {}", AXES[axis]),
+            },
+            wider,
+        },
+    }
+}
+
+/// The poses and the accelerometer by the data alone, if these can contradict one of them. `None` if gravity is not the only reference, or if the user keeps everything.
+fn accel(prepared: &Prepared) -> Option<(Vec<Observation>, Estimated)> {
+    if !prepared.has(Sensor::Accel) || prepared.dwells.keep.everything() {
+        return None;
+    }
+    let poses = prepared.observations(Sensor::Accel);
+    // Of fewer poses none may be left out.
+    if poses.len() + prepared.dwells.left_out.len() < ONE_IN {
+        return None;
+    }
+    let g = prepared.manifest.gravity_mps2;
+    let first = magnitude::first_guess(&poses, g)?;
+    let variances = prepared.magnitude_variances(&first, &poses);
+    // A prior that does not hold would make poses outlying.
+    let accel = magnitude::by_gravity(&poses, &variances, g, None, &prepared.power_ons).ok()?;
+    // If the poses hardly determine the accelerometer, they contradict nothing.
+    (accel.condition <= POOR_POSES).then_some((poses, accel))
 }
 
 /// Poses whose magnitude of gravity the others contradict.
 pub(super) fn poses(prepared: &Prepared) -> Outlying {
-    let mut out = Outlying::default();
-    if !applies(prepared) {
-        return out;
-    }
-    let poses = prepared.observations(Sensor::Accel);
-    // Of fewer poses none may be left out.
-    if poses.len() < ONE_IN {
-        return out;
-    }
-    // If the poses hardly determine the accelerometer, they contradict nothing.
-    let accel = fit_poses(prepared, &poses).filter(|a| a.condition <= POOR_POSES);
-    let Some(accel) = accel else { return out };
-    for judged in outlying_poses(prepared, &poses, &accel.triad.inverse) {
-        let index = poses[judged.row].dwell;
-        let step = prepared.dwells.list[index].step;
-        if prepared.dwells.keep.keeps(step) {
-            continue;
-        }
-        if !judged.can_be_spared() {
-            let (parameter, grows) = judged.grows;
-            let parameter = ACCEL_PARAMETERS[parameter];
-            let kept = Warning::DwellKept {
-                dwell: step,
-                error: judged.error,
-                parameter,
-                wider: grows,
-            };
-            out.warnings.push(kept);
-            continue;
-        }
-        let left_out = Warning::DwellLeftOut {
-            dwell: step,
-            error: judged.error,
-            sigmas: judged.sigmas,
-        };
-        out.warnings.push(left_out);
-        out.left_out.push(LeftOut {
-            sensor: Sensor::Accel,
-            from: index,
-            to: index,
-            error: judged.error,
-            sigmas: judged.sigmas,
-        });
-    }
-    out.with_all = Some(accel.triad);
-    out
+    let Some((poses, accel)) = accel(prepared) else {
+        return Outlying::default();
+    };
+    let found = outlying_poses(prepared, &poses, &accel.triad.inverse);
+    let ends = |row: usize| [poses[row].dwell; 2];
+    Outlying::of(prepared, Sensor::Accel, (found, accel.triad), ends)
 }
 
 /// Parameters of the accelerometer, in the order of the derivatives in the rows of poses.
@@ -129,15 +164,6 @@ const ACCEL_PARAMETERS: [&str; 9] = [
     "the bias of y",
     "the bias of z",
 ];
-
-fn fit_poses(prepared: &Prepared, poses: &[Observation]) -> Option<Estimated> {
-    let g = prepared.manifest.gravity_mps2;
-    let first = magnitude::first_guess(poses, g)?;
-    let variances = prepared.magnitude_variances(&first, poses);
-    let power_ons = &prepared.power_ons;
-    // By the data alone: a prior that does not hold would make poses outlying.
-    magnitude::by_gravity(poses, &variances, g, None, power_ons).ok()
-}
 
 fn outlying_poses(prepared: &Prepared, poses: &[Observation], accel: &Affine<f64>) -> Vec<Judged> {
     let (factors, _) = prepared.magnitudes(accel);
@@ -160,76 +186,42 @@ fn outlying_poses(prepared: &Prepared, poses: &[Observation], accel: &Affine<f64
 
 /// Turns whose direction of gravity the others contradict. They begin and end in dwells that are not left out.
 pub(super) fn turns(prepared: &Prepared) -> Outlying {
-    let mut out = Outlying::default();
-    if !applies(prepared) || !prepared.has(Sensor::Gyro) {
-        return out;
+    outlying_turns(prepared).unwrap_or_default()
+}
+
+fn outlying_turns(prepared: &Prepared) -> Option<Outlying> {
+    if !prepared.has(Sensor::Gyro) {
+        return None;
     }
-    let poses = prepared.observations(Sensor::Accel);
-    if poses.len() + prepared.dwells.left_out.len() < ONE_IN {
-        return out;
-    }
-    let accel = fit_poses(prepared, &poses).filter(|a| a.condition <= POOR_POSES);
-    let Some(accel) = accel else { return out };
-    let g = prepared.manifest.gravity_mps2;
+    let (_, accel) = accel(prepared)?;
     let model = &accel.triad.inverse;
     let (turns, _) = prepared.turns(model);
     if turns.len() < ONE_IN {
-        return out;
+        return None;
     }
-    let rest = prepared.rest(&accel.triad.inverse);
-    let motions = prepared.motions(model);
+    let (rest, motions) = (prepared.rest(model), prepared.motions(model));
     let data = Data {
         turns: &turns,
         rest: &rest,
         accel: &accel.triad,
         motions: &motions,
         start: None,
-        gravity: g,
+        gravity: prepared.manifest.gravity_mps2,
         prior: None,
         power_ons: &prepared.power_ons,
     };
-    let Ok(gyro) = by_turns(prepared, &data) else {
-        return out;
-    };
+    let gyro = by_turns(prepared, &data).ok()?;
     let mut factors = Factors::of_turns(&turns);
     factors.rests(&rest);
     let rows = Row::of(&factors, (Sensor::Gyro, &gyro.triad.inverse), &ALL);
-    let Some(found) = against_others(&rows, turns.len(), 2.0) else {
-        return out;
-    };
+    let found = against_others(&rows, turns.len(), 2.0)?;
     let suspects = outlying(&found, turns.len() / ONE_IN);
-    let step = |dwell: usize| prepared.dwells.list[dwell].step;
-    for judged in contradicted(&rows, turns.len(), 2.0, &suspects) {
-        let turn = &turns[judged.row];
-        if prepared.dwells.keep.keeps(step(turn.to)) {
-            continue;
-        }
-        if !judged.can_be_spared() {
-            let (parameter, grows) = judged.grows;
-            let name = match parameter {
-                0..9 => format!(
-                    "C_{}{} of the gyro",
-                    AXES[parameter / 3],
-                    AXES[parameter % 3]
-                ),
-                _ => format!("the bias of gyro {}", AXES[parameter - 9]),
-            };
-            out.warnings.push(Warning::TurnKept {
-                from: step(turn.from),
-                to: step(turn.to),
-                parameter: name,
-                wider: grows,
-            });
-            continue;
-        }
-        out.left_out.push(LeftOut {
-            sensor: Sensor::Gyro,
-            from: turn.from,
-            to: turn.to,
-            error: judged.error,
-            sigmas: judged.sigmas,
-        });
-    }
-    out.with_all = Some(gyro.triad);
-    out
+    let found = contradicted(&rows, turns.len(), 2.0, &suspects);
+    let ends = |row: usize| [turns[row].from, turns[row].to];
+    Some(Outlying::of(
+        prepared,
+        Sensor::Gyro,
+        (found, gyro.triad),
+        ends,
+    ))
 }

@@ -60,15 +60,11 @@ pub fn estimate(
         .ok_or_else(|| Failure::NoSolution("the given matrix is singular".into()))?;
     let earth = earth_shared::numbers(&observations, &triad.forward.matrix);
     Ok(Estimated {
-        triad,
-        scatter,
-        condition: 1.0,
-        delays: None,
         earth,
-        follows_accel: None,
         notes: vec![Warning::MatrixGiven {
             with_intervals: false,
         }],
+        ..Estimated::new(triad, scatter, 1.0)
     })
 }
 

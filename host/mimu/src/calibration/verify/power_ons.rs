@@ -8,8 +8,8 @@ use super::PowerOn;
 use super::causes::{INTERVAL, of_errors};
 use crate::calibration::Calibration;
 use crate::estimate::factor_fit::{Coordinates, FactorFit, HALF_DEGREE, mean_square};
-use crate::factor::Factors;
 use crate::fit::BIAS_ROUNDS;
+use crate::judging::{Judging, Models};
 use crate::observable::Observable;
 use crate::prepared::Prepared;
 use crate::quantity::{PerSensor, Sensor};
@@ -67,7 +67,8 @@ pub(super) fn with_one_bias(
         let known = known.map_or_else(Vector3::zeros, |(covariance, sigmas)| {
             Vector3::from_fn(|k, _| sigmas * covariance[(k, k)].sqrt())
         });
-        taken[sensor] = move_sensor(&mut moved, sensor, (&model, &up, &known), &power_ons)?;
+        let found = move_sensor(&mut moved, sensor, (&model, &up, &known), &power_ons);
+        taken[sensor] = found.unwrap_or_default();
     }
     Some((moved, taken))
 }
@@ -114,20 +115,13 @@ fn round(
     (model, up): (&Affine<f64>, &Affine<f64>),
     power_ons: &PowerOns,
 ) -> Option<(Vec<[Vector3<f64>; 2]>, f64)> {
-    let turns = moved.turns(up).0;
-    let (mut factors, judged) = match sensor {
-        Sensor::Accel => (moved.magnitudes(model).0, Observable::Magnitude),
-        Sensor::Gyro => {
-            let mut factors = Factors::of_turns(&turns);
-            factors.rests(&moved.rest(up));
-            (factors, Observable::Turns)
-        }
-    };
-    let rows = |group: Observable| {
-        let own = factors.groups().filter(|(of, _)| *of == Some(group));
-        own.map(|(_, rows)| rows.len() as f64).sum::<f64>()
-    };
-    let rows = rows(judged);
+    let mut models = Models::default();
+    models.accel = Some(*up);
+    models[sensor] = Some(*model);
+    let judging = Judging::of(moved, sensor, &models)?;
+    let mut factors = judging.factors;
+    let (judged, rows) = (factors.list[0].group?, factors.rows() as f64);
+    factors.rests(&judging.rests);
     let steps = factors.bias_steps(sensor, power_ons).into_iter();
     let mut coordinates = vec![Coordinates::fixed(sensor, model)];
     coordinates.extend(steps.map(Coordinates::around_zero));
