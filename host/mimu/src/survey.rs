@@ -1,9 +1,8 @@
 //! The noise of a recording at rest: selects a segment, and computes each channel's curve and model.
 //!
 //! One channel is computed at a time: three hours at 1 kHz are 86 MB per channel, and the spectrum takes more memory in addition than the
-//! curves. The next channel is read while the curves are computed.
+//! curves.
 
-mod ahead;
 mod bridging;
 mod columns;
 mod judged;
@@ -15,7 +14,6 @@ mod suspect;
 pub mod unit;
 mod values;
 
-use self::ahead::ahead;
 use self::columns::Columns;
 pub use self::masking::Masked;
 pub use self::segment::Part;
@@ -156,25 +154,16 @@ pub fn survey(
         judged: Vec::new(),
         warnings,
     };
-    let read = |done: usize| {
-        let (i, unit) = (indices[done], units[done]);
+    for (done, (&i, unit)) in indices.iter().zip(units).enumerate() {
         let values = columns.take(Column::Raw(i))?;
-        Values::of(values, &segment, options.part, i, unit, &place)
-    };
-    ahead(&place, indices.len(), read, |done, read, next| {
-        let (i, unit) = (indices[done], units[done]);
-        match read? {
+        match Values::of(values, &segment, options.part, i, unit, &place)? {
             Read::Values(values) => {
-                found.add(i, unit, values, next)?;
+                found.add(i, unit, values)?;
                 progress(0.1 + 0.9 * (done + 1) as f64 / indices.len() as f64);
             }
-            Read::Dead(dead) => {
-                next();
-                found.add_dead(i, unit, dead);
-            }
+            Read::Dead(dead) => found.add_dead(i, unit, dead),
         }
-        Ok(())
-    })?;
+    }
     found.refuse_all_dead(&place)?;
     found.warn_if_suspect(recording, calibration);
     found.refuse_motion(&place)?;
@@ -223,8 +212,8 @@ struct Found<'a> {
 }
 
 impl Found<'_> {
-    /// Computes the noise of the raw channel `i`; calls `next` as soon as there is memory for the next one.
-    fn add(&mut self, i: usize, unit: Unit, values: Values, next: &dyn Fn()) -> Result<()> {
+    /// Computes the noise of the raw channel `i`.
+    fn add(&mut self, i: usize, unit: Unit, values: Values) -> Result<()> {
         let (dt_s, options) = (self.segment.period_s, &self.options);
         self.warnings.extend(values.warnings);
         let samples = values.rates.len();

@@ -7,6 +7,7 @@ use super::TOOL;
 use crate::calibration::{Combined, Judged, SessionOrigin};
 use crate::parameter::{ParameterKind, TriadParameter};
 use crate::quantity::{PerSensor, Sensor, present, raw_unit, scale_unit};
+use crate::sessions::together::Direction;
 use crate::sessions::{CommonTriad, Sessions};
 use crate::triad::Angles;
 
@@ -32,7 +33,7 @@ pub struct SessionsResult {
     /// What does not fit one set of constant parameters, in sentences.
     pub findings: Vec<String>,
     /// The direction along which the biases of all axes move; null if there is none.
-    pub moving_together: Option<TogetherResult>,
+    pub moving_together: Option<Direction>,
     /// The triads.
     #[serde(serialize_with = "present")]
     pub sensors: PerSensor<Option<SensorSessions>>,
@@ -66,19 +67,6 @@ pub struct Predicted {
     pub inside: usize,
     /// Of how many.
     pub of: usize,
-}
-
-/// A direction along which biases move together.
-#[derive(Debug, Clone, Serialize)]
-pub struct TogetherResult {
-    /// Share of the standardised variance of all biases.
-    pub share: f64,
-    /// Probability without a common cause.
-    pub p: f64,
-    /// Change of the biases of gyro and accelerometer for one standard deviation, raw.
-    pub loading: Vec<f64>,
-    /// Position of each used session, in standard deviations.
-    pub scores: Vec<f64>,
 }
 
 /// A triad of all sessions.
@@ -167,12 +155,7 @@ impl SessionsResult {
             }),
             predicted: Predicted { inside, of },
             findings: sessions.sentences(),
-            moving_together: sessions.together.as_ref().map(|d| TogetherResult {
-                share: d.share,
-                p: d.p,
-                loading: d.loading.clone(),
-                scores: d.scores.clone(),
-            }),
+            moving_together: sessions.together.clone(),
             sensors: PerSensor::from_fn(sensor),
         }
     }

@@ -1,6 +1,7 @@
 //! Whether biases of several axes move together from session to session, as they do if a temperature that nobody recorded moves them all.
 
 use nalgebra::{DMatrix, SymmetricEigen};
+use serde::Serialize;
 
 /// Correlations drawn without a common cause, with which the observed one is compared.
 const DRAWS: u32 = 2000;
@@ -8,15 +9,15 @@ const DRAWS: u32 = 2000;
 const LEAST_SESSIONS: usize = 5;
 
 /// A direction along which biases move together.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Direction {
     /// Share of the standardised variance of all biases along it.
     pub share: f64,
     /// Probability of such a share without a common cause.
     pub p: f64,
-    /// Change of each bias for one standard deviation along it, in the unit of the biases.
+    /// Change of the biases of gyro and accelerometer for one standard deviation along it, raw.
     pub loading: Vec<f64>,
-    /// Position of each session along it, in standard deviations.
+    /// Position of each used session along it, in standard deviations.
     pub scores: Vec<f64>,
 }
 

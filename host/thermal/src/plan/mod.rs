@@ -7,7 +7,7 @@ mod prediction;
 mod procedure;
 
 pub use prediction::{At, SensorPrediction};
-pub use procedure::{Procedure, Schedule, Step};
+pub use procedure::{Procedure, Schedule};
 
 use mimu::plan::Plan;
 use mimu::plan::design::budget::DwellNoise;
@@ -52,7 +52,7 @@ pub struct Request {
 }
 
 /// A procedure with its duration and what it determines.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Serialize)]
 pub struct Planned {
     /// `mimu-thermal-plan/1`.
     pub format: &'static str,
@@ -109,7 +109,7 @@ pub fn plan(request: &Request) -> Result<Planned> {
         curves,
         duration_s,
         dwells: schedule.dwells(),
-        sensors: prediction::predict(request, &schedule),
+        sensors: prediction::predict(request, &schedule)?,
         inseparable,
         noise: request.noise,
         schedule,
@@ -120,20 +120,8 @@ pub fn plan(request: &Request) -> Result<Planned> {
 pub fn to_toml(planned: &Planned, sample_rate_hz: f64) -> String {
     let [from, to] = planned.range_c;
     let schedule = &planned.schedule;
-    let steps = schedule.steps.iter().zip(&schedule.times_s);
-    let steps = steps.map(|(step, [from, to])| match *step {
-        Step::Dwell { up, rate_dps, stay } => {
-            mimu::plan::Step::dwell((!stay).then_some(up), rate_dps, to - from)
-        }
-        Step::Turn {
-            axis,
-            angle_deg,
-            rate_dps,
-            ..
-        } => mimu::plan::Step::turn(axis, angle_deg, rate_dps),
-    });
     let round_s = (schedule.rounds > 1 && schedule.waits).then_some(schedule.round_s);
-    Plan::new(Fixture::ThreeAxis, sample_rate_hz, steps.collect())
+    Plan::new(Fixture::ThreeAxis, sample_rate_hz, schedule.steps.clone())
         .in_chamber(schedule.chamber_c.iter().copied())
         .in_rounds(schedule.lead_in_s, schedule.rounds as u32, round_s)
         .to_toml(&format!(

@@ -1,11 +1,14 @@
 //! Standard deviations of the curves that a procedure gives, from the information matrix of the regression.
 
+use mimu::plan::design::reach::Fixture;
+use mimu::plan::{Plan, Planned};
 use mimu::quantity::Sensor;
+use mimu_recording::error::Result;
 use nalgebra::{DMatrix, DVector, Vector3};
 use serde::Serialize;
 
 use super::Request;
-use super::procedure::{Procedure, Schedule, Step};
+use super::procedure::{Procedure, Schedule};
 use crate::basis::Basis;
 use crate::regression::{AxisNoise, CurveKind, Normal, Part, Problem, ProblemRow};
 
@@ -39,13 +42,24 @@ pub struct At {
 }
 
 /// Predicts both triads.
-pub(super) fn predict(request: &Request, schedule: &Schedule) -> Vec<SensorPrediction> {
+pub(super) fn predict(request: &Request, schedule: &Schedule) -> Result<Vec<SensorPrediction>> {
+    let round = Plan::new(
+        Fixture::ThreeAxis,
+        request.sample_rate_hz,
+        schedule.steps.clone(),
+    );
+    let steps = round.dwells(GRAVITY, request.procedure.name())?;
     let each = Sensor::BOTH.into_iter();
-    each.map(|sensor| of(request, schedule, sensor)).collect()
+    Ok(each.map(|s| of(request, schedule, &steps, s)).collect())
 }
 
-fn of(request: &Request, schedule: &Schedule, sensor: Sensor) -> SensorPrediction {
-    let (rows, dies) = rows(request, schedule, sensor);
+fn of(
+    request: &Request,
+    schedule: &Schedule,
+    steps: &[Planned],
+    sensor: Sensor,
+) -> SensorPrediction {
+    let (rows, dies) = rows(request, schedule, steps, sensor);
     let samples = rows.iter().map(|r| r.weight).fold(0.0, f64::max);
     let mut problem = Problem {
         headings: 0,
@@ -84,14 +98,23 @@ fn of(request: &Request, schedule: &Schedule, sensor: Sensor) -> SensorPredictio
 }
 
 /// Rows of `sensor`, with their numbers of samples for weights, and the temperatures of the die.
-fn rows(request: &Request, schedule: &Schedule, sensor: Sensor) -> (Vec<ProblemRow>, Vec<f64>) {
+fn rows(
+    request: &Request,
+    schedule: &Schedule,
+    steps: &[Planned],
+    sensor: Sensor,
+) -> (Vec<ProblemRow>, Vec<f64>) {
     let (mut rows, mut dies) = (Vec::new(), Vec::new());
     for round in 0..schedule.rounds {
         let begin = schedule.lead_in_s + round as f64 * schedule.round_s;
-        for (k, (step, [from, to])) in schedule.steps.iter().zip(&schedule.times_s).enumerate() {
-            let (input, moves) = input(step, sensor);
-            let Some(input) = input else { continue };
-            let count = if moves {
+        for (k, (step, [from, to])) in steps.iter().zip(&schedule.times_s).enumerate() {
+            // A turn against gravity within a row shows the timing of the table rather than the sensor.
+            if sensor == Sensor::Accel && step.turn.is_some() {
+                continue;
+            }
+            let input = input(step, sensor);
+            let moves = step.turn.is_some() || step.rate_dps != 0.0;
+            let count = if sensor == Sensor::Gyro && moves {
                 1.0
             } else {
                 ((to - from) / ROW_S).ceil()
@@ -108,7 +131,7 @@ fn rows(request: &Request, schedule: &Schedule, sensor: Sensor) -> (Vec<ProblemR
                     input,
                     earth: None,
                     reading: Vector3::zeros(),
-                    step: (round * schedule.steps.len() + k) as i32,
+                    step: (round * steps.len() + k) as i32,
                 });
             }
         }
@@ -116,21 +139,12 @@ fn rows(request: &Request, schedule: &Schedule, sensor: Sensor) -> (Vec<ProblemR
     (rows, dies)
 }
 
-/// Mean input in a step, SI, without the rate of the Earth; `None` if the sensor is not evaluated; and whether the input moves.
-fn input(step: &Step, sensor: Sensor) -> (Option<Vector3<f64>>, bool) {
-    match (step, sensor) {
-        (Step::Dwell { up, rate_dps, .. }, Sensor::Gyro) => {
-            (Some(up * rate_dps.to_radians()), *rate_dps != 0.0)
-        }
-        (Step::Dwell { up, .. }, Sensor::Accel) => (Some(up * GRAVITY), false),
-        (
-            Step::Turn {
-                about, rate_dps, ..
-            },
-            Sensor::Gyro,
-        ) => (Some(about * rate_dps.to_radians()), true),
-        // A turn against gravity within a row shows the timing of the table rather than the sensor.
-        (Step::Turn { .. }, Sensor::Accel) => (None, true),
+/// Mean input in a step, SI, without the rate of the Earth; in a turn at its rate.
+fn input(step: &Planned, sensor: Sensor) -> Vector3<f64> {
+    let input = step.input_over(step.length.as_secs_f64());
+    match sensor {
+        Sensor::Gyro => Vector3::from_column_slice(&input[..3]).map(f64::to_radians),
+        Sensor::Accel => Vector3::from_column_slice(&input[3..]),
     }
 }
 

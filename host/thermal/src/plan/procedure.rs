@@ -1,10 +1,9 @@
 //! What chamber and table do in each procedure, and when.
 
-use mimu::plan::TableAxis;
-use mimu::plan::chamber;
 use mimu::plan::design::model::Setting;
 use mimu::plan::design::reach::Fixture;
 use mimu::plan::design::tour::Motion;
+use mimu::plan::{Step, TableAxis, chamber};
 use mimu::quantity::duration;
 use mimu_recording::error::{Argument, Error, Result};
 use nalgebra::Vector3;
@@ -39,33 +38,8 @@ impl Procedure {
     }
 }
 
-/// A dwell, or a turn of one axis of the table.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Step {
-    /// Body direction that points up, and a rate about it, deg/s. `stay`: the turn before has brought it there.
-    Dwell {
-        /// Up in the body's axes.
-        up: Vector3<f64>,
-        /// deg/s.
-        rate_dps: f64,
-        /// Whether the pose is where the turn before it ended.
-        stay: bool,
-    },
-    /// Turn from rest to rest.
-    Turn {
-        /// `middle` or `inner`.
-        axis: TableAxis,
-        /// Degrees, right-hand rule about the table's axis.
-        angle_deg: f64,
-        /// deg/s.
-        rate_dps: f64,
-        /// Axis in the body about which it turns, with the sign.
-        about: Vector3<f64>,
-    },
-}
-
 /// A procedure in time.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Schedule {
     /// Temperature of the chamber: s and °C, linear between, held outside.
     pub chamber_c: Vec<[f64; 2]>,
@@ -217,11 +191,7 @@ fn rest_ramp(request: &Request) -> Schedule {
         rounds: 1,
         round_s: end_s,
         waits: false,
-        steps: vec![Step::Dwell {
-            up: Vector3::z(),
-            rate_dps: 0.0,
-            stay: false,
-        }],
+        steps: vec![Step::dwell(Some(Vector3::z()), 0.0, end_s)],
         times_s: vec![[0.0, end_s]],
     }
 }
@@ -251,11 +221,7 @@ fn faces_and_rates(request: &Request) -> Round {
         times_s.push([t, t + request.dwell_s]);
         t += request.dwell_s;
     }
-    let steps = settings.iter().map(|s| Step::Dwell {
-        up: s.up,
-        rate_dps: s.rate.to_degrees(),
-        stay: false,
-    });
+    let steps = settings.iter().map(|s| Step::of(s, request.dwell_s));
     Round {
         steps: steps.collect(),
         times_s,
@@ -268,37 +234,29 @@ fn faces_and_rates(request: &Request) -> Round {
 /// Eight positions and eight quarter turns. niu's text does not give the order. This one turns both ways about each axis and reaches the
 /// poses of its appendix, upside down: with z up instead of down the tilt stays within 90 degrees, which every table allows.
 fn niu(request: &Request) -> Round {
-    let [x, y, z] = [Vector3::x(), Vector3::y(), Vector3::z()];
     let rate_dps = NIU_DPS.min(request.largest_dps);
     let cycle = [
-        (z, TableAxis::Middle, 90.0, x),
-        (y, TableAxis::Inner, 90.0, z),
-        (x, TableAxis::Middle, -90.0, y),
-        (z, TableAxis::Inner, -90.0, -z),
-        (z, TableAxis::Middle, -90.0, -x),
-        (-y, TableAxis::Inner, 90.0, z),
-        (-x, TableAxis::Middle, 90.0, -y),
-        (z, TableAxis::Inner, -90.0, -z),
+        (TableAxis::Middle, 90.0),
+        (TableAxis::Inner, 90.0),
+        (TableAxis::Middle, -90.0),
+        (TableAxis::Inner, -90.0),
+        (TableAxis::Middle, -90.0),
+        (TableAxis::Inner, 90.0),
+        (TableAxis::Middle, 90.0),
+        (TableAxis::Inner, -90.0),
     ];
     let (mut steps, mut times_s, mut t) = (Vec::new(), Vec::new(), 0.0);
-    for (k, (up, axis, angle_deg, about)) in cycle.into_iter().enumerate() {
+    for (k, (axis, angle_deg)) in cycle.into_iter().enumerate() {
         t += NIU_SETTLE_S;
         times_s.push([t, t + request.dwell_s]);
         t += request.dwell_s;
         let turn_s = 90.0 / rate_dps + NIU_RAMPS_S;
         times_s.push([t, t + turn_s]);
         t += turn_s;
-        steps.push(Step::Dwell {
-            up,
-            rate_dps: 0.0,
-            stay: k > 0,
-        });
-        steps.push(Step::Turn {
-            axis,
-            angle_deg,
-            rate_dps,
-            about,
-        });
+        // Each dwell after the first is where the turn before has ended.
+        let up = (k == 0).then(Vector3::z);
+        steps.push(Step::dwell(up, 0.0, request.dwell_s));
+        steps.push(Step::turn(axis, angle_deg, rate_dps));
     }
     Round {
         steps,
