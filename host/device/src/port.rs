@@ -1,6 +1,7 @@
 //! The device's serial port.
 
 use std::io::{ErrorKind as Io, Read as _, Write as _};
+use std::net::TcpStream;
 use std::path::Path;
 use std::time::Duration;
 
@@ -97,8 +98,20 @@ impl std::fmt::Debug for Port {
     }
 }
 
-/// Reading and writing end of a serial port for a device other than mimu's. A read waits at most `poll`.
+/// Reading and writing end of a serial port, or of `tcp://HOST:PORT`, for a device other than mimu's. A read waits at most `poll`.
 pub fn serial_pair(name: &str, baud: u32, poll: Duration) -> Result<SerialPair> {
+    if let Some(address) = name.strip_prefix("tcp://") {
+        let connected = TcpStream::connect(address).and_then(|line| {
+            line.set_read_timeout(Some(poll))?;
+            line.set_nodelay(true)?;
+            Ok((line.try_clone()?, line))
+        });
+        let (read, write) = connected.map_err(|error| {
+            let remedy = "check that it is on and reachable, and the address, HOST:PORT";
+            Error::device(name, error, remedy)
+        })?;
+        return Ok((Box::new(read), Box::new(write)));
+    }
     let write = serialport::new(name, baud)
         .timeout(poll)
         .open()

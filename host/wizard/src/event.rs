@@ -188,30 +188,10 @@ pub enum Event {
 }
 
 impl Event {
-    /// The unit concerned, if any.
-    pub fn unit(&self) -> Option<&str> {
-        match self {
-            Self::Greeted { unit, .. }
-            | Self::SelfTested { unit, .. }
-            | Self::Waiting { unit, .. }
-            | Self::Dwell { unit, .. }
-            | Self::Discarded { unit, .. }
-            | Self::Progress { unit, .. }
-            | Self::Interrupted { unit, .. }
-            | Self::Verified { unit, .. }
-            | Self::Stored { unit, .. }
-            | Self::Diagnosed { unit, .. }
-            | Self::Turned { unit, .. }
-            | Self::Spun { unit, .. }
-            | Self::SpinLost { unit, .. } => Some(unit),
-            Self::Resumed { .. }
-            | Self::Phase { .. }
-            | Self::Step { .. }
-            | Self::Spin { .. }
-            | Self::Redo { .. }
-            | Self::Note { .. }
-            | Self::Question { .. } => None,
-        }
+    /// The unit concerned, if any: the JSON says it under one key for all kinds.
+    pub fn unit(&self) -> Option<String> {
+        let json = serde_json::to_value(self).ok()?;
+        Some(json.get("unit")?.as_str()?.to_owned())
     }
 }
 

@@ -1,9 +1,9 @@
 //! The port of a board that writes lines of text, read by a thread that waits for bytes.
 
 use std::io::{ErrorKind, Read};
-use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
+use mimu_device::serial_pair;
 use mimu_recording::error::{Error, Result};
 
 use crate::source::{Source, SourceEvent, Unit};
@@ -36,7 +36,7 @@ impl TextOpener {
     pub fn open(&mut self, next: u64) -> Result<TextSource> {
         let board = TextBoard::new(&self.text, self.rate_hz, next, 0.0);
         let mut source = TextSource {
-            input: open(&self.text)?,
+            input: serial_pair(&self.text.port, self.text.baud, POLL)?.0,
             port: self.text.port.clone(),
             began: Instant::now(),
             board: board.with_patience(self.patience_s),
@@ -47,21 +47,6 @@ impl TextOpener {
         self.rate_hz = Some(source.board.unit().rate_hz);
         Ok(source)
     }
-}
-
-fn open(text: &Text) -> Result<Box<dyn Read + Send>> {
-    let Some(address) = text.port.strip_prefix("tcp://") else {
-        return Ok(mimu_device::serial_pair(&text.port, text.baud, POLL)?.0);
-    };
-    let connected = TcpStream::connect(address).and_then(|line| {
-        line.set_read_timeout(Some(POLL))?;
-        Ok(line)
-    });
-    let line = connected.map_err(|error| {
-        let remedy = "check that the board is on the network, and the address, tcp://HOST:PORT";
-        Error::device(&text.port, error, remedy)
-    })?;
-    Ok(Box::new(line))
 }
 
 /// Source of a board that writes lines.

@@ -1,9 +1,8 @@
 //! `mimu record`: arguments and execution.
 
-use std::io::{BufRead as _, IsTerminal as _};
+use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use crate::report;
@@ -17,6 +16,7 @@ use mimu_recording::{Inputs, SampleFormat};
 use crate::arguments::{JsonArgs, assumed_gravity, known_gravity, warned};
 use crate::cmd::device::{PortArgs, duration, interruption, open};
 use crate::output::{check_outputs, print, progress};
+use crate::views::answers::lines;
 
 /// Options common to all recordings of a device, whoever moves the unit.
 #[derive(Args)]
@@ -168,14 +168,18 @@ pub fn run(args: &RecordArgs) -> Result<()> {
     let titles = known.as_ref().map(titles).unwrap_or_default();
     let mut session = open(&args.port)?;
     let stop = interruption()?;
-    let marks = args.steps.then(keyboard).transpose()?;
+    if args.steps && std::io::stdin().is_terminal() {
+        eprintln!("Enter begins a dwell, Enter again ends it");
+    }
+    // Each line is a mark.
+    let marks = args.steps.then(lines).transpose()?;
     let spinner = ProgressBar::new_spinner();
     let look = |state: &RecordingState| {
         spinner.set_message(told(state, args.steps, &titles));
         spinner.tick();
         UserRequest {
             end: stop.load(Ordering::Relaxed),
-            marks: marks.as_ref().map_or(0, |m| m.swap(0, Ordering::Relaxed)),
+            marks: marks.as_ref().map_or(0, |m| m.try_iter().count() as u32),
             drop: None,
         }
     };
@@ -217,27 +221,4 @@ fn told(state: &RecordingState, steps: bool, titles: &[String]) -> String {
         "{length:.1} s, {} samples, {} lost, {:.1} °C{dwell}; Ctrl-C ends the recording",
         state.samples, state.missing, state.temp_c
     )
-}
-
-/// Counts lines on standard input; each is a mark.
-fn keyboard() -> Result<Arc<AtomicU32>> {
-    let marks = Arc::new(AtomicU32::new(0));
-    let counted = marks.clone();
-    if std::io::stdin().is_terminal() {
-        eprintln!("Enter begins a dwell, Enter again ends it");
-    }
-    let read = move || {
-        for _ in std::io::stdin()
-            .lock()
-            .lines()
-            .map_while(std::io::Result::ok)
-        {
-            counted.fetch_add(1, Ordering::Relaxed);
-        }
-    };
-    std::thread::Builder::new()
-        .name("keyboard".into())
-        .spawn(read)
-        .map_err(|error| Error::new("keyboard", error, "record with --step-every"))?;
-    Ok(marks)
 }

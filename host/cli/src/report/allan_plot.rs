@@ -4,44 +4,26 @@ use std::ops::Range;
 
 use maud::{Markup, html};
 
-use super::svg::{Frame, decades, px};
+use super::svg::{AXIS_CLASSES, Chart, Frame, Panel, px};
 use mimu::quantity::{Sensor, significant};
 use mimu::readable;
 use mimu::result::allan::{AllanResult, ChannelResult, ModelResult};
 use mimu_allan::model::{FLOOR, Term};
 
-/// Width and height of one panel, pixels.
-const PANEL: (f64, f64) = (640.0, 520.0);
-
-/// Colours that colour-blind people can distinguish (Okabe and Ito).
-const STYLE: &str = "text{font:14px sans-serif;fill:#000}.tick{font-size:13px}.name{font-size:15px}.heading{font-size:18px}\
-path{fill:none;stroke-width:2}.grid{stroke:#e1e1e1;stroke-width:1}.axis{stroke:#000;stroke-width:1}\
-.x{stroke:#e69f00}.y{stroke:#0072b2}.z{stroke:#009e73}\
-.band{stroke:none;opacity:.2}.x.band{fill:#e69f00}.y.band{fill:#0072b2}.z.band{fill:#009e73}\
-.hadamard{stroke-dasharray:7 4}.line{stroke:#000;stroke-width:1}.model{stroke:#000;stroke-width:1;stroke-dasharray:2 3}\
-circle{fill:#fff;stroke-width:2}.key{fill:#fff;opacity:.85;stroke:#c8c8c8}";
-
-/// Classes of the channels in [`STYLE`].
-const CLASSES: [&str; 3] = ["x", "y", "z"];
+/// The panel of a sensor.
+const PANEL: Panel = Panel {
+    size: (640.0, 520.0),
+    room: [92.0, 14.0, 44.0, 60.0],
+};
 
 /// The curves of a single recording as SVG.
 pub fn svg(result: &AllanResult) -> String {
     let of = |sensor: Sensor| {
         let ours = result.channels.iter().filter(|c| c.sensor == sensor);
-        ours.filter(|c| !c.tau_s.is_empty())
-            .collect::<Vec<&ChannelResult>>()
+        let ours: Vec<&ChannelResult> = ours.filter(|c| !c.tau_s.is_empty()).collect();
+        (!ours.is_empty()).then(|| panel(result, sensor, &ours))
     };
-    let mut panels = Sensor::BOTH.map(|sensor| (sensor, of(sensor))).to_vec();
-    panels.retain(|(_, channels)| !channels.is_empty());
-    let (width, height) = (PANEL.0 * panels.len() as f64, PANEL.1);
-    let drawn = html! {
-        svg xmlns="http://www.w3.org/2000/svg" width=(width) height=(height) viewBox={ "0 0 " (width) " " (height) } {
-            style { (STYLE) }
-            rect width=(width) height=(height) fill="#fff" {}
-            @for (k, (sensor, channels)) in panels.iter().enumerate() { g transform={ "translate(" (PANEL.0 * k as f64) ")" } { (panel(result, *sensor, channels)) } }
-        }
-    };
-    drawn.into_string() + "\n"
+    PANEL.file(&[Sensor::BOTH.into_iter().filter_map(of).collect()])
 }
 
 fn panel(result: &AllanResult, sensor: Sensor, channels: &[&ChannelResult]) -> Markup {
@@ -53,25 +35,16 @@ fn panel(result: &AllanResult, sensor: Sensor, channels: &[&ChannelResult]) -> M
         channels.iter().flat_map(|c| c.adev.iter().map(|d| d * by)),
         1.6,
     );
-    let [log_x, log_y] = [&x, &y].map(|r| r.start.log10()..r.end.log10());
-    let frame = Frame {
-        across: 92.0..PANEL.0 - 14.0,
-        down: 44.0..PANEL.1 - 60.0,
-        x: log_x,
-        y: log_y,
-    };
-    let inside = |deviation: f64| (deviation * by).clamp(y.start, y.end).log10();
+    let frame = PANEL.logarithmic(x, y);
+    let inside = |deviation: f64| (deviation * by).clamp(frame.y.start, frame.y.end);
     let curve = |tau_s: &[f64], deviation: &[f64]| -> Vec<(f64, f64)> {
-        tau_s
-            .iter()
-            .zip(deviation)
-            .map(|(t, d)| (t.log10(), inside(*d)))
-            .collect()
+        let each = tau_s.iter().zip(deviation);
+        each.map(|(t, d)| (*t, inside(*d))).collect()
     };
     // Line style, name and curve of an entry of the legend.
     type Entry = (String, String, Vec<(f64, f64)>);
     let mut entries: Vec<Entry> = Vec::new();
-    for (class, channel) in CLASSES.iter().zip(channels) {
+    for (class, channel) in AXIS_CLASSES.iter().zip(channels) {
         let (name, tau_s) = (channel.name, &channel.tau_s);
         entries.push((
             (*class).into(),
@@ -87,25 +60,36 @@ fn panel(result: &AllanResult, sensor: Sensor, channels: &[&ChannelResult]) -> M
             )
         }));
     }
-    html! {
-        @let sensors = if sensor == Sensor::Gyro { "Gyros" } else { "Accelerometers" };
-        (frame.grid(&format!("{sensors} of {}", result.device.as_deref().unwrap_or_default()), &decades(&x), &decades(&y), true))
-        path class="axis" d={ "M" (px(frame.across.start)) " " (px(frame.down.start)) "V" (px(frame.down.end)) "H" (px(frame.across.end)) } {}
-        (frame.x_name("averaging time, s", &frame))
-        (frame.y_name(&format!("{} deviation, {}", result.kind.unwrap_or_default(), usual.unit)))
-        @for (class, channel) in CLASSES.iter().zip(channels) {
+    let sensors = match sensor {
+        Sensor::Gyro => "Gyros",
+        Sensor::Accel => "Accelerometers",
+    };
+    let title = format!(
+        "{sensors} of {}",
+        result.device.as_deref().unwrap_or_default()
+    );
+    let y_name = format!(
+        "{} deviation, {}",
+        result.kind.unwrap_or_default(),
+        usual.unit
+    );
+    let drawn = html! {
+        path class="ink" d={ "M" (px(frame.across.start)) " " (px(frame.down.start)) "V" (px(frame.down.end)) "H" (px(frame.across.end)) } {}
+        @for (class, channel) in AXIS_CLASSES.iter().zip(channels) {
             @let [high, low] = [&channel.upper, &channel.lower].map(|ends| curve(&channel.tau_s, ends).into_iter());
             (frame.line(&format!("{class} band"), high.chain(low.rev())))
         }
         @for (class, _, points) in &entries { (frame.line(class, points.iter().copied())) }
         @for (_, channel, model) in models(channels) {
-            @let [from, to] = model.range_s.map(f64::log10);
+            @let [from, to] = model.range_s;
             (frame.line("model", curve(&channel.tau_s, &model.adev).into_iter().filter(|(t, _)| (from..=to).contains(t))))
         }
         @for term in MARKED { (marks(&frame, channels, term, by)) }
         (line_marks(&frame, channels, by))
         (legend(&frame, channels, &entries.iter().map(|(class, name, _)| (class.as_str(), name.as_str())).collect::<Vec<_>>()))
-    }
+    };
+    let names = [title.as_str(), "averaging time, s", &y_name];
+    Chart::new(frame, names).drawn(&html! {}, &drawn)
 }
 
 /// Terms that the picture marks.
@@ -127,7 +111,7 @@ fn with_values(channel: &ChannelResult) -> String {
 
 /// A wedge whose tip is at a place, pixels.
 fn wedge(x: f64, y: f64) -> Markup {
-    html! { path class="line" d={ "M" (px(x - 4.0)) " " (px(y - 7.0)) "L" (px(x)) " " (px(y)) "L" (px(x + 4.0)) " " (px(y - 7.0)) } {} }
+    html! { path class="ink" d={ "M" (px(x - 4.0)) " " (px(y - 7.0)) "L" (px(x)) " " (px(y)) "L" (px(x + 4.0)) " " (px(y - 7.0)) } {} }
 }
 
 /// Averaging time at which a sinusoid of frequency 1 increases an Allan deviation most: the maximum of `sin²(π τ)/(π τ)`.
@@ -160,9 +144,7 @@ fn line_marks(frame: &Frame, channels: &[&ChannelResult], by: f64) -> Markup {
     }
     // From left to right along the falling curve: the highest frequency comes first.
     marks.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let places = marks
-        .iter()
-        .map(|(f, high)| (*f, (BENT_AT / f).log10(), high.log10()));
+    let places = marks.iter().map(|(f, high)| (*f, BENT_AT / f, *high));
     let inside = places.filter(|(_, x, y)| frame.x.contains(x) && frame.y.contains(y));
     let mut labels: Vec<(f64, f64)> = Vec::new();
     let mut place = |(f, x, y): (f64, f64, f64)| {
@@ -185,14 +167,14 @@ fn line_marks(frame: &Frame, channels: &[&ChannelResult], by: f64) -> Markup {
 fn marks(frame: &Frame, channels: &[&ChannelResult], term: Term, by: f64) -> Markup {
     let places = models(channels).filter_map(|(k, channel, model)| {
         let (t, deviation) = read_at(channel, model, term)?;
-        Some((k, t.log10(), (deviation * by).log10()))
+        Some((k, t, deviation * by))
     });
     let inside = places.filter(|(_, x, y)| frame.x.contains(x) && frame.y.contains(y));
     let marks: Vec<(usize, f64, f64)> = inside
         .map(|(k, x, y)| (k, frame.at_x(x), frame.at_y(y)))
         .collect();
     html! {
-        @for (k, x, y) in &marks { circle class=(CLASSES[*k]) cx=(px(*x)) cy=(px(*y)) r="4" {} }
+        @for (k, x, y) in &marks { circle class=(AXIS_CLASSES[*k]) cx=(px(*x)) cy=(px(*y)) r="4" {} }
         @if let Some((_, x, y)) = marks.iter().min_by(|a, b| a.2.total_cmp(&b.2)) {
             @let x = x.clamp(frame.across.start + EDGE, frame.across.end - EDGE);
             text x=(px(x)) y=(px((y - 9.0).max(frame.down.start + LABEL.1))) text-anchor="middle" { (term.letter()) }
@@ -230,11 +212,11 @@ fn legend(frame: &Frame, channels: &[&ChannelResult], curves: &[(&str, &str)]) -
     let height = 10.0 + 18.0 * key.len() as f64;
     let (left, top) = (frame.across.end - 6.0 - width, frame.down.start + 6.0);
     html! {
-        rect class="key" x=(px(left)) y=(px(top)) width=(px(width)) height=(px(height)) {}
+        rect class="legend" x=(px(left)) y=(px(top)) width=(px(width)) height=(px(height)) {}
         @for (row, (class, name)) in key.iter().enumerate() {
             @let y = top + 14.0 + 18.0 * row as f64;
             @match *class {
-                "mark" => circle class="line" cx=(px(left + 20.0)) cy=(px(y)) r="4" {},
+                "mark" => circle class="ink" cx=(px(left + 20.0)) cy=(px(y)) r="4" {},
                 "wedge" => (wedge(left + 20.0, y + 4.0)),
                 "" => {},
                 class => path class=(class) d={ "M" (px(left + 8.0)) " " (px(y)) "h24" } {},

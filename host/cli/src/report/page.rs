@@ -72,7 +72,12 @@ impl Made {
     }
 }
 
-pub(super) const STYLE: &str = include_str!("page/style.css");
+/// Style of the figures, and of the whole page.
+pub(super) const FIGURES: &str = include_str!("page/figures.css");
+pub(super) const STYLE: &str = concat!(
+    include_str!("page/figures.css"),
+    include_str!("page/style.css")
+);
 /// Elements without an end tag, closed as XML requires.
 const META: &str = r#"<meta charset="utf-8"/><meta name="viewport" content="width=device-width, initial-scale=1"/>"#;
 

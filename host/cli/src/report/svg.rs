@@ -3,7 +3,9 @@
 
 use std::ops::Range;
 
-use maud::{Markup, html};
+use maud::{Markup, PreEscaped, html};
+
+use super::page::{FIGURES, STYLE};
 
 /// Maps values to pixels of a drawing.
 #[derive(Debug, Clone)]
@@ -16,43 +18,52 @@ pub struct Frame {
     pub x: Range<f64>,
     /// Values at the bottom and the top end.
     pub y: Range<f64>,
+    /// Whether both axes are logarithmic.
+    pub logarithmic: bool,
 }
+
+/// Classes of the three axes of a sensor: colours that colour-blind people can distinguish (Okabe and Ito).
+pub const AXIS_CLASSES: [&str; 3] = ["axis-x", "axis-y", "axis-z"];
 
 impl Frame {
     /// Pixel of an abscissa.
     pub fn at_x(&self, x: f64) -> f64 {
-        let share = (x - self.x.start) / (self.x.end - self.x.start);
+        let share = self.share(x, &self.x);
         self.across.start + share * (self.across.end - self.across.start)
     }
 
     /// Pixel of an ordinate.
     pub fn at_y(&self, y: f64) -> f64 {
-        let share = (y - self.y.start) / (self.y.end - self.y.start);
+        let share = self.share(y, &self.y);
         self.down.end - share * (self.down.end - self.down.start)
+    }
+
+    fn share(&self, value: f64, of: &Range<f64>) -> f64 {
+        match self.logarithmic {
+            true => (value / of.start).ln() / (of.end / of.start).ln(),
+            false => (value - of.start) / (of.end - of.start),
+        }
+    }
+
+    /// Numbers of an axis with this range, and their labels.
+    fn numbers(&self, range: &Range<f64>) -> Vec<(f64, String)> {
+        match self.logarithmic {
+            true => decades(range),
+            false => ticks(range, 5),
+        }
     }
 
     /// Grid, numbers and a heading. Numbers of the ordinate are shown only if `with_y`.
     pub fn axes(&self, heading: &str, with_y: bool) -> Markup {
-        let (x, y) = (ticks(&self.x, 5), ticks(&self.y, 5));
-        let zero = self.y.contains(&0.0).then(|| self.at_y(0.0));
-        html! {
-            (self.grid(heading, &x, &y, with_y))
-            @if let Some(y) = zero {
-                path class="zero" d={ "M" (px(self.across.start)) " " (px(y)) "H" (px(self.across.end)) } {}
-            }
-        }
+        self.grid(heading, &self.numbers(&self.x), with_y)
     }
 
-    /// Grid, numbers and a heading, at given places with given labels.
-    pub fn grid(
-        &self,
-        heading: &str,
-        x: &[(f64, String)],
-        y: &[(f64, String)],
-        with_y: bool,
-    ) -> Markup {
+    /// Grid, numbers and a heading, with the given numbers of the abscissa.
+    fn grid(&self, heading: &str, x: &[(f64, String)], with_y: bool) -> Markup {
+        let y = self.numbers(&self.y);
         let (left, right) = (self.across.start, self.across.end);
         let (top, bottom) = (self.down.start, self.down.end);
+        let zero = (!self.logarithmic && self.y.contains(&0.0)).then(|| self.at_y(0.0));
         html! {
             path class="grid" d=(y.iter().map(|(y, _)| format!("M{left:.1} {:.1}H{right:.1}", self.at_y(*y))).collect::<String>()) {}
             path class="grid" d=(x.iter().map(|(x, _)| format!("M{:.1} {top:.1}V{bottom:.1}", self.at_x(*x))).collect::<String>()) {}
@@ -60,11 +71,12 @@ impl Frame {
                 text class="tick" x=(px(self.at_x(*x))) y=(px(bottom + 14.0)) text-anchor="middle" { (label) }
             }
             @if with_y {
-                @for (y, label) in y {
+                @for (y, label) in &y {
                     text class="tick" x=(px(left - 6.0)) y=(px(self.at_y(*y) + 3.5)) text-anchor="end" { (label) }
                 }
             }
             text class="heading" x=(px(left)) y=(px(top - 8.0)) { (heading) }
+            @if let Some(y) = zero { path class="zero" d={ "M" (px(left)) " " (px(y)) "H" (px(right)) } {} }
         }
     }
 
@@ -158,11 +170,10 @@ impl Frame {
         mark: impl Fn(usize, f64, f64) -> String,
     ) -> Markup {
         let known = points
+            .map(|(x, y)| (self.at_x(x), self.at_y(y)))
             .filter(|(x, y)| x.is_finite() && y.is_finite())
             .enumerate();
-        let d: String = known
-            .map(|(k, (x, y))| mark(k, self.at_x(x), self.at_y(y)))
-            .collect();
+        let d: String = known.map(|(k, (x, y))| mark(k, x, y)).collect();
         html! { path class=(class) d=(d) {} }
     }
 }
@@ -191,7 +202,35 @@ impl Panel {
             down: top..self.size.1 - bottom,
             x,
             y,
+            logarithmic: false,
         }
+    }
+
+    /// The same with logarithmic axes.
+    pub fn logarithmic(&self, x: Range<f64>, y: Range<f64>) -> Frame {
+        Frame {
+            logarithmic: true,
+            ..self.frame(x, y)
+        }
+    }
+
+    /// Drawings of this size in rows, as a file.
+    pub fn file(&self, rows: &[Vec<Markup>]) -> String {
+        let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
+        let (width, height) = (
+            self.size.0 * columns as f64,
+            self.size.1 * rows.len() as f64,
+        );
+        let drawn = html! {
+            svg xmlns="http://www.w3.org/2000/svg" width=(width) height=(height) viewBox={ "0 0 " (width) " " (height) } font-family="sans-serif" {
+                style { (PreEscaped(light_style())) }
+                rect width=(width) height=(height) fill="#fff" {}
+                @for (down, row) in rows.iter().enumerate() { @for (across, drawn) in row.iter().enumerate() {
+                    g transform={ "translate(" (self.size.0 * across as f64) " " (self.size.1 * down as f64) ")" } { (drawn) }
+                } }
+            }
+        };
+        drawn.into_string() + "\n"
     }
 
     /// The complete drawing; `label` describes it for screen readers, `class` is in the style sheet.
@@ -203,8 +242,65 @@ impl Panel {
     }
 }
 
+/// Style of the figures with the page's light colours in place of their names, which few programs other than browsers know.
+fn light_style() -> String {
+    let light = STYLE.split(":root{").nth(1).unwrap_or_default();
+    let light = light
+        .split('}')
+        .next()
+        .unwrap_or_default()
+        .split([';', '\n']);
+    let colours = light.filter_map(|colour| colour.split_once(':'));
+    colours.fold(FIGURES.to_owned(), |style, (name, colour)| {
+        style.replace(&format!("var({name})"), colour)
+    })
+}
+
+/// A drawing with its names: heading, abscissa and ordinate.
+pub struct Chart<'a> {
+    /// Where values are.
+    pub frame: Frame,
+    /// Heading, name of the abscissa, and of the ordinate.
+    pub names: [&'a str; 3],
+    /// Numbers of the abscissa in place of the usual ones, with their labels.
+    pub numbers: Option<Vec<(f64, String)>>,
+    /// Class and name of each series.
+    pub key: Vec<(&'a str, &'a str)>,
+}
+
+impl<'a> Chart<'a> {
+    /// A chart in this frame, without a key.
+    pub fn new(frame: Frame, names: [&'a str; 3]) -> Self {
+        Self {
+            frame,
+            names,
+            numbers: None,
+            key: Vec::new(),
+        }
+    }
+
+    /// With a key of these series.
+    pub fn keyed(self, key: impl IntoIterator<Item = (&'a str, &'a str)>) -> Self {
+        let key = key.into_iter().collect();
+        Self { key, ..self }
+    }
+
+    /// The chart with what is behind the grid, and what is before it.
+    pub fn drawn(&self, behind: &Markup, before: &Markup) -> Markup {
+        let (frame, [heading, x, y]) = (&self.frame, self.names);
+        html! {
+            (behind)
+            @match &self.numbers { Some(numbers) => (frame.grid(heading, numbers, true)), None => (frame.axes(heading, true)) }
+            @if !x.is_empty() { (frame.x_name(x, frame)) }
+            @if !y.is_empty() { (frame.y_name(y)) }
+            (before)
+            (frame.legend(&self.key))
+        }
+    }
+}
+
 /// Powers of ten in the range, with their labels, for a logarithmic axis; with their multiples by 2 and 5 if there are few.
-pub fn decades(range: &Range<f64>) -> Vec<(f64, String)> {
+fn decades(range: &Range<f64>) -> Vec<(f64, String)> {
     let many = (range.end / range.start).log10() > 2.5;
     let factors: &[i32] = if many { &[1] } else { &[1, 2, 5] };
     let powers = range.start.log10().floor() as i32..=range.end.log10().ceil() as i32;
@@ -215,7 +311,7 @@ pub fn decades(range: &Range<f64>) -> Vec<(f64, String)> {
             -3..=4 => format!("{value}"),
             _ => format!("{factor}·10{}", raised(&power.to_string())),
         };
-        range.contains(&value).then_some((value.log10(), label))
+        range.contains(&value).then_some((value, label))
     });
     each.collect()
 }
@@ -265,7 +361,7 @@ pub fn raised(text: &str) -> String {
 }
 
 /// About this many round numbers in the range, with their labels.
-pub fn ticks(range: &Range<f64>, about: usize) -> Vec<(f64, String)> {
+fn ticks(range: &Range<f64>, about: usize) -> Vec<(f64, String)> {
     let width = range.end - range.start;
     let rough = width / about as f64;
     let decade = 10f64.powf(rough.log10().floor());
@@ -307,8 +403,24 @@ mod tests {
             down: 10.0..110.0,
             x: -1.0..1.0,
             y: 0.0..4.0,
+            logarithmic: false,
         };
         assert_eq!((frame.at_x(-1.0), frame.at_x(1.0)), (50.0, 250.0));
         assert_eq!((frame.at_y(4.0), frame.at_y(0.0)), (10.0, 110.0));
+        let logarithmic = Frame {
+            x: 0.01..100.0,
+            logarithmic: true,
+            ..frame
+        };
+        assert_eq!(logarithmic.at_x(1.0), 150.0);
+    }
+
+    #[test]
+    fn a_file_has_colours_and_no_names_of_them() {
+        let style = light_style();
+        assert!(
+            style.contains("#b36b00") && !style.contains("var("),
+            "{style}"
+        );
     }
 }

@@ -5,31 +5,21 @@ use std::ops::Range;
 
 use maud::{Markup, html};
 
-use super::svg::{Frame, px, range};
+use super::svg::{AXIS_CLASSES, Chart, Panel, px, range};
 use mimu::parameter::ParameterKind;
 use mimu::quantity::{AXES, Sensor};
 use mimu::readable;
 use mimu_thermal::judge::{Bin, DwellError};
 use mimu_thermal::result::{CurveResult, SensorResult, ThermalResult};
 
-/// Width and height of one panel, pixels.
-const PANEL: (f64, f64) = (400.0, 330.0);
-
-/// Colours that colour-blind people can distinguish (Okabe and Ito), the same as for Allan curves.
-const STYLE: &str = ".curves text{font:13px sans-serif;fill:#000;font-weight:400}.curves .tick{font-size:12px}\
-.curves .name{font-size:13px}.curves .heading{font-size:15px}.curves path{fill:none;stroke-width:2}\
-.curves .grid{stroke:#e1e1e1;stroke-width:1}.curves .zero{stroke:#888;stroke-width:1}\
-.curves .a{stroke:#e69f00}.curves .b{stroke:#0072b2}.curves .c{stroke:#009e73}\
-.curves .noise{stroke:#888;stroke-dasharray:2 3}.curves .band{stroke:none;opacity:.2}\
-.curves .a.band{fill:#e69f00}.curves .b.band{fill:#0072b2}.curves .c.band{fill:#009e73}\
-.curves .heating{stroke:#d55e00}.curves .cooling{stroke:#56b4e9}\
-.curves .dot{stroke-width:4;stroke-linecap:round;opacity:.6}.curves .begin{stroke:#888;stroke-width:1;stroke-dasharray:4 3}";
+/// A panel: three stand side by side.
+const PANEL: Panel = Panel {
+    size: (400.0, 330.0),
+    room: [78.0, 12.0, 34.0, 46.0],
+};
 
 /// Largest number of marks of an axis. If there are more dwells, neighbours are averaged.
 const MARKS: usize = 200;
-
-/// Classes of the three parameters of a kind.
-const CLASSES: [&str; 3] = ["a", "b", "c"];
 
 /// A panel: its description for screen readers, and the drawing.
 type Drawn = (String, Markup);
@@ -62,19 +52,8 @@ fn rows(result: &ThermalResult) -> Vec<Vec<Drawn>> {
 
 /// All panels as one file.
 pub fn svg(result: &ThermalResult) -> String {
-    let rows = rows(result);
-    let [across, down] = [ParameterKind::PHYSICAL.len(), rows.len()].map(|n| n as f64);
-    let (width, height) = (PANEL.0 * across, PANEL.1 * down);
-    let drawn = html! {
-        svg class="curves" xmlns="http://www.w3.org/2000/svg" width=(width) height=(height) viewBox={ "0 0 " (width) " " (height) } {
-            style { (STYLE) }
-            rect width=(width) height=(height) fill="#fff" {}
-            @for (k, row) in rows.iter().enumerate() { @for (column, (_, drawn)) in row.iter().enumerate() {
-                g transform={ "translate(" (PANEL.0 * column as f64) " " (PANEL.1 * k as f64) ")" } { (drawn) }
-            } }
-        }
-    };
-    drawn.into_string() + "\n"
+    let drawn = |row: Vec<Drawn>| row.into_iter().map(|(_, drawn)| drawn).collect();
+    PANEL.file(&rows(result).into_iter().map(drawn).collect::<Vec<_>>())
 }
 
 /// The same panels separately, in the colours of the page.
@@ -84,27 +63,7 @@ pub fn panels(result: &ThermalResult) -> Markup {
 
 /// One panel in the colours of the page; `label` describes it for screen readers.
 pub(super) fn panel(label: &str, drawn: &Markup) -> Markup {
-    html! { svg class="curves" role="img" aria-label=(label) viewBox={ "0 0 " (PANEL.0) " " (PANEL.1) } xmlns="http://www.w3.org/2000/svg" { (drawn) } }
-}
-
-/// The frame of a panel with these ranges.
-fn frame([from, to]: [f64; 2], y: Range<f64>) -> Frame {
-    Frame {
-        across: 78.0..PANEL.0 - 12.0,
-        down: 34.0..PANEL.1 - 46.0,
-        x: from..to,
-        y,
-    }
-}
-
-/// Axes with their names and a legend, around what is `inside`.
-fn framed(
-    frame: &Frame,
-    [heading, x, y]: [&str; 3],
-    key: &[(&str, &str)],
-    inside: &Markup,
-) -> Markup {
-    html! { (frame.axes(heading, true)) (inside) (frame.x_name(x, frame)) (frame.y_name(y)) (frame.legend(key)) }
+    PANEL.drawing(label, None, drawn)
 }
 
 /// A point of a curve: temperature, °C, change from the middle of the range, and bounds of its 95 % interval, if known.
@@ -118,29 +77,20 @@ pub(super) fn changes(
     curves: &[(String, Vec<Point>)],
 ) -> Markup {
     let values = curves.iter().flat_map(|(_, points)| points);
-    let frame = frame(
-        range_c,
-        range(values.flat_map(|(_, value, ends)| ends.unwrap_or([*value; 2]))),
-    );
-    let each = || CLASSES.into_iter().zip(curves);
-    let key: Vec<(&str, &str)> = each()
-        .map(|(class, (axis, _))| (class, axis.as_str()))
-        .collect();
-    let inside = html! { @for (class, (_, points)) in each() {
+    let y = range(values.flat_map(|(_, value, ends)| ends.unwrap_or([*value; 2])));
+    let each = || AXIS_CLASSES.into_iter().zip(curves);
+    let y_name = format!("change from the middle, {unit}");
+    let chart = Chart::new(
+        PANEL.frame(range_c[0]..range_c[1], y),
+        [heading, "die, °C", &y_name],
+    )
+    .keyed(each().map(|(class, (axis, _))| (class, axis.as_str())));
+    let frame = &chart.frame;
+    chart.drawn(&html! {}, &html! { @for (class, (_, points)) in each() {
         @let band: Vec<_> = points.iter().filter_map(|(t, _, ends)| ends.map(|[low, high]| (*t, low, high))).collect();
         @if !band.is_empty() { (frame.band(&format!("{class} band"), &band)) }
         (frame.line(class, points.iter().map(|(t, value, _)| (*t, *value))))
-    } };
-    framed(
-        &frame,
-        [
-            heading,
-            "die, °C",
-            &format!("change from the middle, {unit}"),
-        ],
-        &key,
-        &inside,
-    )
+    } })
 }
 
 /// Curves of one kind of parameter of a sensor, if it has them.
@@ -188,17 +138,15 @@ fn errors(result: &ThermalResult, sensor: Sensor, found: &SensorResult) -> Marku
         ("noise", points(|b| Some(b.noise_floor))),
     ];
     let all = lines.iter().flat_map(|l| l.1.iter().map(|p| p.1));
-    let frame = frame([from, to], range(all.chain([0.0])));
+    let frame = PANEL.frame(from..to, range(all.chain([0.0])));
     let inside =
         html! { @for (class, points) in &lines { (frame.line(class, points.iter().copied())) } };
     let y_name = format!("rms over {}, {}", found.judged_by, unit.unit);
     let key = lines.each_ref().map(|(name, _)| (*name, *name));
-    framed(
-        &frame,
-        [&format!("{sensor} error"), "die, °C", &y_name],
-        &key,
-        &inside,
-    )
+    let names = [&format!("{sensor} error"), "die, °C", &y_name];
+    Chart::new(frame, names)
+        .keyed(key)
+        .drawn(&html! {}, &inside)
 }
 
 /// Mean of neighbouring dwells: hours since the beginning of the first recording, temperature of the die, and errors in the shown unit.
@@ -228,25 +176,22 @@ fn dwells(result: &ThermalResult, sensor: Sensor, found: &SensorResult) -> [Mark
         String::new()
     };
     let y_name = format!("error, {means}{}", unit.unit);
-    let key: Vec<(&str, &str)> = CLASSES.into_iter().zip(AXES).collect();
     let y = range(marks.iter().flat_map(|m| m.1));
-    let drawn = |at: usize, x: [f64; 2], heading: String, x_name: &str| {
-        let frame = frame(x, y.clone());
-        let inside = html! {
+    let drawn = |at: usize, x: Range<f64>, heading: String, x_name: &str| {
+        let names = [heading.as_str(), x_name, &y_name];
+        let chart =
+            Chart::new(PANEL.frame(x, y.clone()), names).keyed(AXIS_CLASSES.into_iter().zip(AXES));
+        let frame = &chart.frame;
+        chart.drawn(&html! {}, &html! {
             @if at == 0 { @for hours in &begins { path class="begin" d={ "M" (px(frame.at_x(*hours))) " " (px(frame.down.start)) "V" (px(frame.down.end)) } {} } }
-            @for (axis, class) in CLASSES.iter().enumerate() { (frame.dots(&format!("{class} dot"), marks.iter().map(|m| (m.0[at], m.1[axis])))) }
-        };
-        framed(&frame, [&heading, x_name, &y_name], &key, &inside)
+            @for (axis, class) in AXIS_CLASSES.iter().enumerate() { (frame.dots(&format!("{class} dot"), marks.iter().map(|m| (m.0[at], m.1[axis])))) }
+        })
     };
+    let [from, to] = result.range_c;
     let hours = range(marks.iter().map(|m| m.0[0]));
-    let over_time = drawn(
-        0,
-        [hours.start, hours.end],
-        format!("{sensor} error over time"),
-        "time, h",
-    );
+    let over_time = format!("{sensor} error over time");
     [
-        drawn(1, result.range_c, format!("{sensor} error"), "die, °C"),
-        over_time,
+        drawn(1, from..to, format!("{sensor} error"), "die, °C"),
+        drawn(0, hours, over_time, "time, h"),
     ]
 }

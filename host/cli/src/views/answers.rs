@@ -25,23 +25,28 @@ pub(crate) struct Typed {
     ended: bool,
 }
 
+/// The lines of standard input, as they come.
+pub(crate) fn lines() -> Result<Receiver<String>> {
+    let (tell, lines) = channel();
+    let read = move || {
+        let mut input = std::io::stdin()
+            .lock()
+            .lines()
+            .map_while(std::io::Result::ok);
+        // Until nobody listens any more.
+        let _ = input.try_for_each(|line| tell.send(line));
+    };
+    std::thread::Builder::new()
+        .name("keyboard".into())
+        .spawn(read)
+        .map_err(|error| Error::new("keyboard", error, "run it again"))?;
+    Ok(lines)
+}
+
 impl Typed {
     pub(crate) fn new(stop: Arc<AtomicBool>) -> Result<Self> {
-        let (tell, lines) = channel();
-        let read = move || {
-            let input = std::io::stdin().lock();
-            for line in input.lines().map_while(std::io::Result::ok) {
-                if tell.send(line).is_err() {
-                    return;
-                }
-            }
-        };
-        std::thread::Builder::new()
-            .name("keyboard".into())
-            .spawn(read)
-            .map_err(|error| Error::new("keyboard", error, "run it again"))?;
         Ok(Self {
-            lines,
+            lines: lines()?,
             stop,
             requests: VecDeque::new(),
             asked: false,

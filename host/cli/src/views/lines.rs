@@ -42,7 +42,8 @@ impl Lines {
 
     /// Prefix of a line about one of several units: the end of its name, because ids of one production lot have a common beginning.
     fn whose(&self, event: &Event) -> String {
-        match event.unit().filter(|_| self.units.len() > 1) {
+        let several = self.units.len() > 1;
+        match several.then(|| event.unit()).flatten() {
             Some(unit) => {
                 let from = unit.char_indices().rev().nth(TAIL - 1).map_or(0, |c| c.0);
                 format!("{}: ", &unit[from..])

@@ -1,7 +1,6 @@
 //! A text connection to a table or a chamber, over TCP or a serial port.
 
 use std::io::{BufRead as _, BufReader, Write};
-use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
 use mimu_recording::error::{Error, Result};
@@ -15,29 +14,12 @@ pub(super) struct Line {
 }
 
 impl Line {
-    pub fn tcp(address: &str, timeout: Duration) -> Result<Self> {
-        let broken =
-            |e: std::io::Error| Error::device(address, e, "check that it is on and reachable");
-        let stream = TcpStream::connect(address).map_err(broken)?;
-        stream
-            .set_read_timeout(Some(Duration::from_millis(50)))
-            .map_err(broken)?;
-        stream.set_nodelay(true).map_err(broken)?;
-        let read = stream.try_clone().map_err(broken)?;
-        Ok(Self {
-            read: BufReader::new(Box::new(read)),
-            write: Box::new(stream),
-            name: address.to_owned(),
-            timeout,
-        })
-    }
-
-    pub fn serial(port: &str, baud: u32, timeout: Duration) -> Result<Self> {
+    pub fn open(port: &str, baud: u32, timeout: Duration) -> Result<Self> {
         let (read, write) = mimu_device::serial_pair(port, baud, Duration::from_millis(50))?;
         Ok(Self {
             read: BufReader::new(read),
             write,
-            name: port.to_owned(),
+            name: port.trim_start_matches("tcp://").to_owned(),
             timeout,
         })
     }

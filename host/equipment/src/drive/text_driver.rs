@@ -37,8 +37,8 @@ impl TextDriver {
         let file = DriverFile::read(path)?;
         let timeout = Duration::from_secs_f64(file.timeout_s.clamp(0.1, 600.0));
         let line = match (&file.tcp, &file.serial) {
-            (Some(address), None) => Line::tcp(address, timeout)?,
-            (None, Some(port)) => Line::serial(port, file.baud, timeout)?,
+            (Some(address), None) => Line::open(&format!("tcp://{address}"), file.baud, timeout)?,
+            (None, Some(port)) => Line::open(port, file.baud, timeout)?,
             _ => {
                 let problem = "it needs one of tcp and serial";
                 let remedy = "give the address or the port of the table or the chamber";

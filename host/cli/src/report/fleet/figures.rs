@@ -6,7 +6,7 @@ use mimu::quantity::Sensor;
 use mimu_fleet::result::{ChartOfParameter, ParameterOfFleet};
 
 use super::tables::{parameter, readable};
-use crate::report::svg::{Panel, px, range, ticks};
+use crate::report::svg::{Chart, Panel, range};
 
 /// A small panel: three stand side by side.
 const SMALL: Panel = Panel {
@@ -48,13 +48,13 @@ pub(super) fn histogram(sensor: Sensor, of: &ParameterOfFleet) -> Markup {
     };
     let filled = counts.iter().enumerate().filter(|(_, count)| **count > 0);
     let inside = html! {
-        (frame.axes(&name, true))
         path class="bars" d=(filled.map(bar).collect::<String>()) {}
         (frame.line("fit", steps.map(|x| (x, bell(x)))))
-        (frame.x_name(&format!("from the mean, {}", readable.unit), &frame))
     };
     let label = format!("Histogram of {name} over the units");
-    SMALL.drawing(&label, Some("many"), &inside)
+    let x_name = format!("from the mean, {}", readable.unit);
+    let chart = Chart::new(frame, [&name, &x_name, ""]);
+    SMALL.drawing(&label, Some("many"), &chart.drawn(&html! {}, &inside))
 }
 
 /// A control chart: means of days, their moving average, and its limits.
@@ -94,13 +94,16 @@ pub(super) fn chart(of: &ChartOfParameter, heading: &str) -> Markup {
     let since = of.since.iter().filter_map(|s| s.parse::<Date>().ok());
     let spans: Vec<(f64, f64)> = since.map(|day| (number(&day), frame.x.end)).collect();
     let inside = html! {
-        (frame.spans("block", &spans))
-        (frame.grid(&format!("{heading}, {}", readable.unit), &dates, &ticks(&frame.y, 5), true))
-        path class="zero" d={ "M" (px(frame.across.start)) " " (px(frame.at_y(0.0))) "H" (px(frame.across.end)) } {}
         (frame.dots("dot small", at.iter().copied().zip(means)))
         @for sign in [1.0, -1.0] { (frame.line("limit", at.iter().copied().zip(limits.iter().map(|l| sign * l)))) }
         (frame.line("fit", at.iter().copied().zip(averages.iter().copied())))
     };
+    let behind = frame.spans("block", &spans);
+    let title = format!("{heading}, {}", readable.unit);
+    let chart = Chart {
+        numbers: Some(dates),
+        ..Chart::new(frame, [&title, "", ""])
+    };
     let label = format!("Control chart of {heading}");
-    CHART.drawing(&label, Some("many"), &inside)
+    CHART.drawing(&label, Some("many"), &chart.drawn(&behind, &inside))
 }

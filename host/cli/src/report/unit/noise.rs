@@ -7,12 +7,11 @@ use mimu::readable;
 use mimu_allan::model::{FLOOR, Term};
 
 use crate::report::page::{shown, spoken};
-use crate::report::svg::{Panel, decades};
+use crate::report::svg::{AXIS_CLASSES, Chart, Panel};
 use crate::report::table::{between, table};
 
 /// Number of points of a curve.
 const POINTS: usize = 60;
-const CLASSES: [&str; 3] = ["axis-x", "axis-y", "axis-z"];
 
 /// The table and the curves.
 pub fn section(noise: &NoiseFile) -> Markup {
@@ -77,15 +76,12 @@ fn drawn(sensor: Sensor, channels: &[&NoiseChannel], noise: &NoiseFile) -> Marku
         values().fold(f64::INFINITY, f64::min) / 1.4,
         values().fold(0.0, f64::max) * 1.4,
     );
-    let frame = Panel::ONE.frame(from.log10()..to.log10(), low.log10()..high.log10());
-    let names = channels.iter().map(|c| c.name.as_str());
-    let entries: Vec<(&str, &str)> = CLASSES.into_iter().cycle().zip(names).collect();
-    let inside = html! {
-        (frame.grid(spoken(sensor), &decades(&(from..to)), &decades(&(low..high)), true))
-        (frame.y_name(&format!("Allan deviation, {}", unit.unit)))
-        (frame.x_name("averaging time, s", &frame))
-        @for (k, curve) in curves.iter().enumerate() { (frame.line(CLASSES[k % 3], curve.iter().map(|p| (p.0.log10(), p.1.log10())))) }
-        (frame.legend(&entries))
-    };
-    Panel::ONE.drawing(&format!("Allan deviation of the {sensor}"), None, &inside)
+    let y_name = format!("Allan deviation, {}", unit.unit);
+    let names = [spoken(sensor), "averaging time, s", &y_name];
+    let classes = || AXIS_CLASSES.into_iter().cycle();
+    let chart = Chart::new(Panel::ONE.logarithmic(from..to, low..high), names)
+        .keyed(classes().zip(channels.iter().map(|c| c.name.as_str())));
+    let inside = html! { @for (class, curve) in classes().zip(&curves) { (chart.frame.line(class, curve.iter().copied())) } };
+    let label = format!("Allan deviation of the {sensor}");
+    Panel::ONE.drawing(&label, None, &chart.drawn(&html! {}, &inside))
 }

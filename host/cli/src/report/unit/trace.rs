@@ -5,11 +5,10 @@ use mimu::prepared::Prepared;
 use mimu::quantity::{AXES, Sensor};
 
 use crate::report::page::spoken;
-use crate::report::svg::{Panel, range};
+use crate::report::svg::{AXIS_CLASSES, Chart, Panel, range};
 
 /// Largest number of points of a curve. If there are more blocks, the minima and maxima of neighbours are drawn.
 const POINTS: usize = 600;
-const CLASSES: [&str; 3] = ["axis-x", "axis-y", "axis-z"];
 const MINUTE_S: f64 = 60.0;
 
 /// Raw readings of both sensors.
@@ -45,10 +44,6 @@ fn drawn(prepared: &Prepared, sensor: Sensor) -> Markup {
         each.filter(|p| p.1.is_finite()).collect()
     };
     let curves: Vec<_> = sensor.channels().map(curve).collect();
-    let frame = Panel::ONE.frame(
-        range(blocks.iter().map(|b| b.start_s / MINUTE_S)),
-        range(curves.iter().flatten().map(|p| p.1)),
-    );
     let all = prepared.dwells.list.iter();
     let used = all.filter(|d| d.faults[sensor].is_none());
     let minutes = |s: f64| s / MINUTE_S;
@@ -58,14 +53,12 @@ fn drawn(prepared: &Prepared, sensor: Sensor) -> Markup {
         unit if unit == "SI" => sensor.unit().into(),
         unit => unit,
     };
-    let entries: Vec<(&str, &str)> = CLASSES.into_iter().zip(AXES).collect();
-    let inside = html! {
-        (frame.spans("block", &dwells))
-        (frame.axes(spoken(sensor), true))
-        (frame.y_name(&format!("reading, {unit}")))
-        (frame.x_name("time, min", &frame))
-        @for (class, curve) in CLASSES.iter().zip(&curves) { (frame.line(class, curve.iter().copied())) }
-        (frame.legend(&entries))
-    };
-    Panel::ONE.drawing(&format!("raw {sensor} over time"), None, &inside)
+    let minutes = range(blocks.iter().map(|b| b.start_s / MINUTE_S));
+    let frame = Panel::ONE.frame(minutes, range(curves.iter().flatten().map(|p| p.1)));
+    let y_name = format!("reading, {unit}");
+    let chart = Chart::new(frame, [spoken(sensor), "time, min", &y_name])
+        .keyed(AXIS_CLASSES.into_iter().zip(AXES));
+    let lines = html! { @for (class, curve) in AXIS_CLASSES.iter().zip(&curves) { (chart.frame.line(class, curve.iter().copied())) } };
+    let drawn = chart.drawn(&chart.frame.spans("block", &dwells), &lines);
+    Panel::ONE.drawing(&format!("raw {sensor} over time"), None, &drawn)
 }
