@@ -177,10 +177,8 @@ blind: toolchain ## undeclared effects on hundreds of units and in real recordin
 clumsy: toolchain ## 200 sessions of the wizard with people and boards that err, in virtual time
 	$(CARGO) run --locked --release -p mimu-tests --features studies --bin clumsy 200
 
-bench: toolchain ## rates and peak memory on four hours at 1 kHz, and of a diagnosis
+bench: toolchain ## rates and peak memory on four hours at 1 kHz
 	$(CARGO) bench --locked -p mimu-cli --bench four_hours
-	$(CARGO) bench --locked -p mimu-tests --bench diagnosis
-	$(CARGO) bench --locked -p mimu-rig --bench step
 
 count: ## lines of each crate, public items, long functions, files that an addition touches
 	@python3 tests/count.py
