@@ -1,9 +1,6 @@
 //! Sessions of the wizard with boards that write text, in the hands of people who err, in virtual time: `clumsy SESSIONS [FIRST [FOLDER]]`. FIRST is
 //! the first seed; FOLDER keeps the sessions.
 //!
-//! `clumsy population PART UNITS SESSIONS [FOLDER]`: sessions of so many units of a part make its population (`mimu fleet --prior`), and as many further units as
-//! SESSIONS are calibrated with it and without it.
-//!
 //! `clumsy TROUBLE SESSIONS [FIRST [FOLDER]]`: every session has one of these besides.
 //!
 //! | trouble | what |
@@ -17,7 +14,6 @@
 //! A session passes if it ends in a calibration that is right. One that ends in another way says why; a wrong calibration is an error of the wizard.
 
 mod person;
-mod population;
 mod sensors;
 
 use std::collections::BTreeMap;
@@ -96,25 +92,11 @@ struct Session {
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    if let [what, part, numbers @ ..] = &arguments[..]
-        && what == "population"
-    {
-        let kept = numbers.get(2).map(PathBuf::from);
-        let numbers: Result<Vec<u64>, _> = numbers.iter().take(2).map(|a| a.parse()).collect();
-        let (Some(part), Ok([units, sessions])) = (sensors::number(part), numbers.as_deref())
-        else {
-            eprintln!("clumsy: give a part, the units of its population and the sessions");
-            return ExitCode::FAILURE;
-        };
-        return population::run(part, *units, *sessions, kept.as_deref());
-    }
     let (trouble, arguments) = match &arguments[..] {
         [what, rest @ ..] if what.parse::<u64>().is_err() => match Trouble::named(what) {
             Some(trouble) => (Some(trouble), rest),
             None => {
-                eprintln!(
-                    "clumsy: {what:?} is unknown; give drift, clock, steps, swap, kills or population"
-                );
+                eprintln!("clumsy: {what:?} is unknown; give drift, clock, steps, swap or kills");
                 return ExitCode::FAILURE;
             }
         },
@@ -136,7 +118,7 @@ fn main() -> ExitCode {
                 Some(Trouble::Clock) => wrong_clock(&mut sensor.board, seed),
                 _ => {}
             }
-            let session = session(seed, sensor, trouble, (kept.as_deref(), ""));
+            let session = session(seed, sensor, trouble, kept.as_deref());
             println!("{}", session.line());
             session
         })
@@ -185,13 +167,8 @@ impl Session {
     }
 }
 
-/// The units and habits of a seed, and what became of them. `kept` keeps the session; `more`: further arguments.
-fn session(
-    seed: u64,
-    sensor: Sensor,
-    trouble: Option<Trouble>,
-    (kept, more): (Option<&Path>, &str),
-) -> Session {
+/// The units and habits of a seed, and what became of them. `kept` keeps the session.
+fn session(seed: u64, sensor: Sensor, trouble: Option<Trouble>, kept: Option<&Path>) -> Session {
     let habits = Habits::of(seed).with(trouble);
     let folder = tempfile::tempdir().expect("a folder");
     let out = match kept {
@@ -201,7 +178,7 @@ fn session(
     let mut person = Person::new(&habits, seed, trouble);
     let (mut runs, mut end) = ([0; 2], End::Killed);
     while runs[0] <= AGAIN[0] && runs[1] <= AGAIN[1] {
-        end = run(&sensor, &mut person, &out, more);
+        end = run(&sensor, &mut person, &out);
         match &end {
             End::Refused(_) if person.now_s < LONGEST_S => runs[0] += 1,
             End::Killed if person.now_s < LONGEST_S => runs[1] += 1,
@@ -221,11 +198,11 @@ fn session(
 }
 
 /// Runs the command until it ends, or the person has no more patience.
-fn run(sensor: &Sensor, person: &mut Person, out: &Path, more: &str) -> End {
+fn run(sensor: &Sensor, person: &mut Person, out: &Path) -> End {
     let (arrivals, heard): (Sender<Stamped>, Receiver<Stamped>) = channel();
     let (tell, events) = channel();
     let arguments = format!(
-        "wizard -o {} --port USB --gravity 9.793 --text t_us,ax,ay,az,gx,gy,gz --raw-unit {} --device unit --dwell 2 --warm-up 0{more}",
+        "wizard -o {} --port USB --gravity 9.793 --text t_us,ax,ay,az,gx,gy,gz --raw-unit {} --device unit --dwell 2 --warm-up 0",
         out.display(),
         sensor.unit
     );

@@ -34,11 +34,6 @@ const PARTS: [Part; 10] = [
 /// Lines a second.
 const RATES: [f64; 3] = [50.0, 100.0, 200.0];
 
-/// Number of the part with this name: seeds with it as their last digit are of this part.
-pub fn number(name: &str) -> Option<u64> {
-    PARTS.iter().position(|p| p.0 == name).map(|k| k as u64)
-}
-
 impl Sensor {
     /// The board of a seed: each part at each rate in turn.
     pub fn of(seed: u64) -> Self {

@@ -8,7 +8,7 @@
 //! redder (alpha 0 to -4), the only noises of an inertial sensor at such cluster lengths, and for any noise with the modified variance. For
 //! white and flicker phase noise, which are hardly correlated between samples, the loss is larger (up to a factor s for white, whose
 //! deviation is then still known to 0.6 %); the edf of the point includes it. With this rule the cost of a curve grows about as N from 1e6
-//! samples on, however densely the times are spaced (`benches/allan.rs`).
+//! samples on, however densely the times are spaced.
 
 use super::bounds::{self, Estimator};
 use super::deviation::{ALL_TERMS, BLOCK, Integrated, Plan, Squares, sums_of_squares};

@@ -224,7 +224,6 @@ impl Found<'_> {
         self.judged.push((i, values.suitability));
         let spectrum = Lines::of(&values.rates, dt_s, options.confidence);
         let integrated = Integrated::new(values.rates, dt_s).map_err(not_finite)?;
-        next();
         let mut channel = Channel::of(i, unit, samples);
         channel.masked = values.masked;
         channel.spectrum = spectrum;

@@ -249,11 +249,6 @@ impl Board {
         })
     }
 
-    /// Replaces the front end at the pins.
-    pub fn set_front(&mut self, front: Front) -> Result<(), String> {
-        self.with(move |s| s.session.board_mut().part.sampler.front = front)
-    }
-
     /// Conversions of ADC1 since the last call.
     pub fn conversions(&mut self) -> Result<Conversions, String> {
         self.with(|s| s.session.board_mut().part.sampler.take_conversions())
@@ -313,16 +308,6 @@ impl Board {
             let at = s.stop.at;
             let part = &mut s.session.board_mut().part;
             Operate::peek(part, at, address, Width::W32).map_err(|e| e.to_string())
-        })?
-    }
-
-    /// Flips one bit of flash memory.
-    ///
-    /// Errors: also an address that is not flash.
-    pub fn flip(&mut self, address: u64, bit: u32) -> Result<(), String> {
-        self.with(move |s| {
-            let byte = read(s.host, address, 1)?[0] ^ (1 << (bit % 8));
-            program(s.host, address, &[byte])
         })?
     }
 

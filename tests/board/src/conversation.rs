@@ -1,7 +1,6 @@
 //! The host's end of the serial line, for tests: calls and received messages, in virtual time.
 
 use mimu_board::running::Board;
-use mimu_core::compensation::Sample as SiSample;
 use mimu_core::wire::{
     BatchHead, CHUNK, Call, Counts, Decoder, Event, MAX_FRAME, Message, Refusal, Reply, Request,
     Verdict, encode,
@@ -69,8 +68,6 @@ pub struct Conversation {
     answers: Vec<(u16, Answer)>,
     /// Samples of the raw stream since they were last taken.
     pub samples: Vec<Sample>,
-    /// The same of the compensated stream, by number: rad/s and m/s².
-    pub compensated: Vec<(u32, SiSample<f32>)>,
     /// Samples and batches that the device has lost, according to the last batch.
     pub lost: (u32, u32),
     /// Head of the last raw batch, and the temperatures of its first three thermometers, °C.
@@ -86,7 +83,6 @@ impl Conversation {
             next_id: 0,
             answers: Vec::new(),
             samples: Vec::new(),
-            compensated: Vec::new(),
             lost: (0, 0),
             last: None,
         }
@@ -155,10 +151,6 @@ impl Conversation {
                             period_ns: batch.head.period_ns,
                             flags: batch.head.flags,
                         }));
-                }
-                Message::Event(Event::Compensated(batch)) => {
-                    assert!(batch.is_whole(), "{batch:?}");
-                    self.compensated.extend(batch.values());
                 }
                 Message::Event(_) => {}
             }

@@ -38,9 +38,9 @@ fn a_gyro_that_leaves_its_range_in_every_turn_is_named_after_four_of_them() {
     // 20 deg/s.
     board.largest[0] = 3754.9 * 20_f64.to_radians();
     let (why, at_s) = refused(Spinner::new(board, 1, &[]), "", None);
-    assert!(
-        why.contains("the gyro is at the end of its range in 4 of 4 turns"),
-        "{why}"
+    says(
+        &why,
+        &["the gyro is at the end of its range in 4 of 4 turns"],
     );
     assert!(
         why.contains("larger range") && at_s < 60.0,

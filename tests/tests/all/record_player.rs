@@ -209,9 +209,9 @@ fn rates_that_contradict_each_other_are_said_and_readings_in_si_tell_33_rpm_from
     };
     assert!(!said_of("200").contains("33 1/3 rpm"), "{}", said_of("200"));
     let wrong = said_of("270");
-    assert!(
-        wrong.contains("was the turntable at 33 1/3 rpm while the rate of 45 rpm is given?"),
-        "{wrong}"
+    says(
+        &wrong,
+        &["was the turntable at 33 1/3 rpm while the rate of 45 rpm is given?"],
     );
 }
 

@@ -227,15 +227,6 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
     #[test]
-    fn random_bytes_never_panic_nor_hang(
-        bytes in prop::collection::vec(any::<u8>(), 0..400),
-        chunk in 1_u64..100,
-    ) {
-        let _ = read(&bytes, chunk);
-        let _ = read(&[HEADER.as_bytes(), &bytes].concat(), chunk);
-    }
-
-    #[test]
     fn near_misses_never_panic_and_never_lose_a_row(
         text in "([0-9.,\"nae\r-]{0,12}\n){0,20}",
         chunk in 1_u64..50,

@@ -69,30 +69,3 @@ impl FromStr for Face {
         })
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_face_is_named_by_the_axis_along_which_the_specific_force_is_positive() {
-        let face: Face = "-y".parse().unwrap();
-        assert_eq!(face.inputs(9.81)[3..], [0.0, -9.81, 0.0]);
-        assert_eq!("+z".parse::<Face>().unwrap().inputs(9.8)[5], 9.8);
-        for wrong in ["x", "+w", "", "+x+", "up"] {
-            let error = wrong.parse::<Face>().unwrap_err().to_string();
-            assert!(error.contains("+x, -x"), "{error}");
-        }
-    }
-
-    #[test]
-    fn the_faces_that_no_file_shows_are_named() {
-        let faces: Vec<Face> = ["+x", "-x", "+y", "-z"]
-            .iter()
-            .map(|text| text.parse().unwrap())
-            .collect();
-        let warning = Face::missing(&faces).unwrap();
-        assert!(warning.contains("-y, +z have"), "{warning}");
-        assert_eq!(Face::missing(&Face::all()), None);
-    }
-}

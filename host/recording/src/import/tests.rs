@@ -2,8 +2,6 @@
 
 use std::path::{Path, PathBuf};
 
-use proptest::prelude::*;
-
 use super::super::{Batch, Manifest, RawUnit, Recording, Reference};
 use super::*;
 use crate::error::Argument;
@@ -456,34 +454,4 @@ fn options_that_contradict_each_other_are_refused() {
     let mut options = bench.options(&["a"], &[ACC]);
     options.gravity_mps2 = 1.0;
     assert!(bench.refused(&options).contains("looks like g"));
-}
-
-proptest! {
-    #![proptest_config(ProptestConfig::with_cases(64))]
-
-    #[test]
-    fn random_bytes_never_panic(
-        bytes in prop::collection::vec(any::<u8>(), 0..300),
-        inputs in prop::collection::vec(any::<u8>(), 0..100),
-        by_name in any::<bool>(),
-    ) {
-        let bench = Bench::new(&[]);
-        std::fs::write(bench.path("a"), &bytes).unwrap();
-        std::fs::write(bench.path("i"), [b"step,turn_x_deg\n", &inputs[..]].concat()).unwrap();
-        let list = if by_name { "t_s=a,gyro_x=b,gyro_y=c,gyro_z=d,step=e" } else { "t_s,gyro_x,gyro_y,gyro_z,step" };
-        let mut options = bench.options(&["a"], &[list]);
-        let _ = bench.import(&options);
-        options.log.inputs = Some(bench.path("i"));
-        let _ = bench.import(&options);
-    }
-
-    #[test]
-    fn near_misses_never_panic(text in "([0-9.,;\"#na \t\r-]{0,14}\n){0,12}", list in 0..3_usize) {
-        let list = ["t_s,gyro_x,gyro_y,gyro_z", "step,gyro_x,gyro_y,gyro_z,-", "t_s=n,gyro_x=a,gyro_y=1,gyro_z=2"][list];
-        let bench = Bench::new(&[("a", &text), ("b", &text)]);
-        let mut options = bench.options(&["a"], &[list]);
-        options.log.rate_hz = Some(1.0);
-        let _ = bench.import(&options);
-        let _ = bench.import(&bench.options(&["a", "b"], &["t_s,gyro_x,gyro_y,gyro_z", "t_s,accel_x,accel_y,accel_z"]));
-    }
 }

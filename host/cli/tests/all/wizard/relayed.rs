@@ -193,9 +193,9 @@ fn times_of_a_clock_three_percent_fast_are_converted_and_the_intervals_hold() {
     let trusted = text.replace("times = \"board\"", "times = \"trusted\"");
     std::fs::write(&manifest, trusted).unwrap();
     let said = done(&out, "fit calibration");
-    assert!(
-        said.contains("judgement: suspect: the clock of its samples runs 1.03"),
-        "{said}"
+    says(
+        &said,
+        &["judgement: suspect: the clock of its samples runs 1.03"],
     );
 }
 

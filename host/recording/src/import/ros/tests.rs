@@ -127,10 +127,7 @@ fn topics_are_listed_where_several_fit_or_none_does() {
     says(&several, &["/imu/data", "/imu/raw"]);
     assert!(!several.contains("/chatter"), "{several}");
     let none = refused("imu.mcap", Some("/chatter"));
-    assert!(
-        none.contains("/chatter (std_msgs/msg/String)") && none.contains("/imu ("),
-        "{none}"
-    );
+    says(&none, &["/chatter (std_msgs/msg/String)", "/imu ("]);
 }
 
 /// Stamps and values of all rows.
