@@ -106,7 +106,7 @@ fn wrong_usage_has_status_2() {
         &["--still", "0"],
         &["--still", "nan"],
         &["--still", "-3"],
-        &["--method", "guess"],
+        &["--class", "guess"],
         &["--unknown"],
     ] {
         let run = mimu(
