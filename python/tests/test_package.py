@@ -35,7 +35,7 @@ OF_FILES = {"json", "strict", "verbose", "replace", "force"}
     [
         # The objects, and destinations of the result.
         (mimu.fit, "fit", OF_FILES | {"class", "dwells", "o"}),
-        (mimu.fit_sessions, "fit", OF_FILES | {"class", "dwells", "o", "method", "only", "keep", "prior", "whole_turns", "placement", "reference_error", "part"}),
+        (mimu.fit_sessions, "fit", OF_FILES | {"class", "dwells", "o", "only", "keep", "prior", "whole_turns", "placement", "reference_error", "part"}),
         (mimu.verify, "verify", OF_FILES),
         (mimu.diagnose, "diagnose", OF_FILES | {"o", "page", "plan", "next"}),
         (mimu.allan, "allan", OF_FILES | {"from", "to", "plot", "o"}),
