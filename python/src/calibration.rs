@@ -9,7 +9,8 @@ use mimu::quantity::{PerSensor, Sensor, significant};
 use mimu::readable::STANDARD_GRAVITY;
 use mimu_cli::report::fragment;
 use mimu_core::compensation::Affine;
-use mimu_export::{Sources, json as as_json};
+use mimu_export::json::Json;
+use mimu_export::{Nothing, Sources, Target};
 use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::stage;
 use numpy::ndarray::{Array2, ArrayView2, Zip};
@@ -207,7 +208,7 @@ impl Calibration {
             calibration: Some((&self.model, &self.name)),
             ..Sources::default()
         };
-        let made = as_json::export(&from).map_err(|error| raised(py, &error))?;
+        let made = Json::export(&from, &Nothing {}).map_err(|error| raised(py, &error))?;
         loaded(py, &String::from_utf8_lossy(&made.content))
     }
 

@@ -5,7 +5,7 @@ use std::pin::Pin;
 use std::sync::mpsc::Receiver;
 
 use clap::{Args, CommandFactory, Parser};
-use mimu_export::{Export, Format, Sources};
+use mimu_export::{Choice, Export, Sources};
 use mimu_recording::ImportSummary;
 use mimu_recording::error::Error;
 use mimu_wizard::event::View;
@@ -64,11 +64,11 @@ pub fn export(arguments: Vec<OsString>, from: &Sources) -> Result<Export, Refusa
     #[derive(Parser)]
     struct To {
         #[command(subcommand)]
-        format: Format,
+        to: Choice,
     }
     let arguments = std::iter::once("export".into()).chain(arguments);
-    let to = To::try_parse_from(arguments).map_err(usage)?;
-    Ok(to.format.export(from)?)
+    let chosen = To::try_parse_from(arguments).map_err(usage)?;
+    Ok(chosen.to.export(from)?)
 }
 
 /// A session of the wizard: its result, and the error line if it failed ([`mimu_wizard::turn`]).

@@ -9,15 +9,12 @@
 //! Source: libraries/AP_InertialSensor/AP_InertialSensor_Backend.cpp, `_rotate_and_correct_accel` and `_gyro`; AP_InertialSensor.cpp for names and
 //! ranges.
 
-use mimu::calibration::Calibration;
-use mimu::calibration::bias_cubic::BiasCubics;
-use mimu::calibration::thermal_biases::ThermalBiases;
 use mimu::quantity::Sensor;
 use mimu_recording::error::{Argument, Result};
 
-use crate::one_temperature::{self, LETTERS, within};
-use crate::parameters::Parameter;
-use crate::{Export, Sources, heading, parameters, px4};
+use crate::convention::{Convention, within};
+use crate::parameters::{CONVENTION, GIVE_FACTOR, LETTERS, Options, Parameter};
+use crate::{Export, Page, Sources, Target};
 
 /// Reference temperature, °C.
 const REFERENCE_C: f64 = 35.0;
@@ -30,136 +27,78 @@ const MOST_OFFSET: f64 = 3.5;
 /// Range of an accelerometer's scale factors that it documents.
 const SCALES: [f64; 2] = [0.8, 1.2];
 
-/// Options of ArduPilot's parameters.
-pub type Options = parameters::Options;
+/// The format.
+pub struct ArduPilot;
 
-/// Parameters for biases over temperature, or for offsets and scale factors at one temperature.
-///
-/// # Errors
-/// The calibration is missing, an offset or a scale factor exceeds ArduPilot's range, or an error of [`BiasCubics::of`], [`BiasCubics::of_rest`] or
-/// `Conversion::of`.
-pub fn export(from: &Sources, options: &Options) -> Result<Export> {
-    let mut export = Export::new("ardupilot", from);
-    if let Some(biases) = from.biases {
-        return at_rest(biases, options, export);
-    }
-    let (calibration, _) = from.calibration()?;
-    export.notes.push("ArduPilot measures gyro offsets again at every start (INS_GYR_CAL), at the temperature of that start.".into());
-    export.notes.push("It accepts an accelerometer as calibrated only if INS_ACC_ID is its device id: give --accel-id, or calibrate there once and then load this file.".into());
-    for (sensor, id) in options.ids() {
-        let name = format!("INS_{}{}_ID", short(sensor), number(options.imu));
-        export
-            .parameters
-            .extend(id.map(|id| Parameter::int32(name, id)));
-    }
-    match &calibration.temperature {
-        Some(over) => {
-            let range_c = cut(over.range_c, &mut export);
-            px4::cubics(calibration, options, range_c, REFERENCE_C, &mut export)?;
-            parameters_of(&export.cubics, options.imu, &mut export.parameters)?;
+impl Target for ArduPilot {
+    type Options = Options;
+    const NAME: &str = "ardupilot";
+    const ABOUT: &str = "Parameters of ArduPilot: INS_TCAL* over temperature, INS_ACCOFFS, INS_ACCSCAL and INS_GYROFFS at one";
+    const CONTENTS: &str =
+        "biases over temperature, or biases and scale factors at one temperature";
+    const READERS: &str = "ArduPilot";
+    const CONVENTION: Convention = CONVENTION;
+    const TAKES_BIASES: bool = true;
+    const PAGES: &[Page] = &[Page::of("ArduPilot", "ardupilot.parm")];
+
+    /// # Errors
+    /// The calibration is missing, an offset or a scale factor exceeds ArduPilot's range, or an error of `BiasCubics::of`, `BiasCubics::of_rest` or
+    /// `Conversion::of`.
+    fn export(from: &Sources, options: &Options) -> Result<Export> {
+        let mut export = Export::new::<Self>(from);
+        if let Some(biases) = from.biases {
+            over_temperature(options, from, biases.range_c, &mut export)?;
+            at_rest(options, biases.has(Sensor::Accel), &mut export);
+            return Ok(options.file(export, from));
         }
-        None => at_one_temperature(calibration, options, &mut export)?,
-    }
-    let comments = heading::comments("#", &heading::of_calibration(calibration, &export));
-    export.content = options.text(&comments, &export.parameters).into_bytes();
-    Ok(export)
-}
-
-/// `range_c`, limited to ArduPilot's range.
-fn cut([from_c, to_c]: [f64; 2], export: &mut Export) -> [f64; 2] {
-    let range_c = [from_c.max(RANGE_C[0]), to_c.min(RANGE_C[1])];
-    if range_c != [from_c, to_c] {
-        let note = "The range is limited to ArduPilot's -70 to 80 °C.";
-        export.notes.push(note.into());
-    }
-    range_c
-}
-
-/// Writes the coefficients alone. ArduPilot's own calibration over temperature is made at rest too, and does the same: it leaves the offsets to the
-/// calibrations at one temperature, with their CALTEMP. Source: libraries/AP_InertialSensor/AP_InertialSensor_tempcal.cpp, `save_calibration`.
-fn at_rest(biases: &ThermalBiases, options: &Options, mut export: Export) -> Result<Export> {
-    let (imu, n) = (options.imu, number(options.imu));
-    let range_c = cut(biases.range_c, &mut export);
-    px4::cubics_at_rest(biases, options, range_c, REFERENCE_C, &mut export)?;
-    export.notes.push(format!("Scale factors and offsets stay the flight controller's own (INS_ACC{n}SCAL, INS_ACC{n}OFFS): a recording at rest does not show them."));
-    if biases.has(Sensor::Accel) {
-        export.notes.push(format!("accel: ArduPilot subtracts what the bias has changed by since the temperature INS_ACC{imu}_CALTEMP of its accelerometer calibration. Repeat that calibration after loading this file if the temperature is missing there (-300)."));
-    }
-    export.notes.push("gyro: its offsets are measured again at every start (INS_GYR_CAL), at the temperature of that start.".into());
-    coefficients(&export.cubics, imu, &mut export.parameters);
-    let comments = heading::comments("#", &heading::of_biases(biases, &export));
-    export.content = options.text(&comments, &export.parameters).into_bytes();
-    Ok(export)
-}
-
-/// Short name of a sensor in parameter names.
-fn short(sensor: Sensor) -> &'static str {
-    match sensor {
-        Sensor::Gyro => "GYR",
-        Sensor::Accel => "ACC",
+        let (calibration, _) = from.calibration()?;
+        export.note("ArduPilot measures gyro offsets again at every start (INS_GYR_CAL), at the temperature of that start.");
+        export.note("It accepts an accelerometer as calibrated only if INS_ACC_ID is its device id: give --accel-id, or calibrate there once and then load this file.");
+        for (sensor, id) in options.ids() {
+            let id = id.map(|id| Parameter::int32(name(options, sensor, "_ID"), id));
+            export.parameters.extend(id);
+        }
+        match &calibration.temperature {
+            Some(over) => {
+                over_temperature(options, from, over.range_c, &mut export)?;
+                settled(options, &mut export)?;
+            }
+            None => at_one_temperature(options, from, &mut export)?,
+        }
+        Ok(options.file(export, from))
     }
 }
 
-/// Number of a unit in parameter names; the first unit has none.
-fn number(imu: u8) -> String {
-    match imu {
+/// Name of a parameter of a sensor. The first unit has no number.
+fn name(options: &Options, sensor: Sensor, what: &str) -> String {
+    let number = match options.imu {
         1 => String::new(),
         imu => imu.to_string(),
-    }
+    };
+    format!("INS_{}{number}{what}", short(sensor))
 }
 
-fn at_one_temperature(
-    calibration: &Calibration,
+/// Cubics and their parameters, over a range that is limited to ArduPilot's.
+fn over_temperature(
     options: &Options,
+    from: &Sources,
+    [from_c, to_c]: [f64; 2],
     export: &mut Export,
 ) -> Result<()> {
-    let imu = options.imu;
-    export.notes.push(format!("ArduPilot subtracts INS_TCAL{imu}_* too: set INS_TCAL{imu}_ENABLE to 0, unless they come from a calibration without these offsets."));
-    for of in one_temperature::offsets(calibration, options, export)? {
-        for (axis, letter) in LETTERS.iter().enumerate() {
-            let offset = offset_parameter(of.sensor, axis, imu, of.offset[axis])?;
-            export.parameters.push(offset);
-            if of.sensor == Sensor::Accel {
-                let name = format!("INS_ACC{}SCAL_{letter}", number(imu));
-                let remedy = (
-                    "give the factor by which the driver converts",
-                    Argument::AccelConversion,
-                );
-                within(of.sensor, axis, (&name, of.scale[axis], ""), SCALES, remedy)?;
-                export
-                    .parameters
-                    .push(Parameter::real(name, of.scale[axis]));
-            }
-        }
+    let range_c = [from_c.max(RANGE_C[0]), to_c.min(RANGE_C[1])];
+    if range_c != [from_c, to_c] {
+        export.note("The range is limited to ArduPilot's -70 to 80 °C.");
     }
-    Ok(())
-}
-
-/// Parameter of an offset, SI.
-fn offset_parameter(sensor: Sensor, axis: usize, imu: u8, offset: f64) -> Result<Parameter> {
-    let (short, number) = (short(sensor), number(imu));
-    let name = format!("INS_{short}{number}OFFS_{}", LETTERS[axis]);
-    if sensor == Sensor::Accel {
-        let range = [-MOST_OFFSET, MOST_OFFSET];
-        let remedy = (
-            "give the raw reading that the driver treats as zero input",
-            Argument::AccelZero,
-        );
-        within(sensor, axis, (&name, offset, " m/s²"), range, remedy)?;
-    }
-    Ok(Parameter::real(name, offset))
-}
-
-/// Parameters of the temperature range and the coefficients.
-fn coefficients(sensors: &[BiasCubics], imu: u8, out: &mut Vec<Parameter>) {
-    let Some(first) = sensors.first() else {
-        return;
+    options.cubics(from, range_c, REFERENCE_C, export)?;
+    let Some(first) = export.cubics.first() else {
+        return Ok(());
     };
-    let prefix = format!("INS_TCAL{imu}");
+    let out = &mut export.parameters;
+    let prefix = format!("INS_TCAL{}", options.imu);
     out.push(Parameter::int8(format!("{prefix}_ENABLE"), 1));
     out.push(Parameter::real(format!("{prefix}_TMIN"), first.range_c[0]));
     out.push(Parameter::real(format!("{prefix}_TMAX"), first.range_c[1]));
-    for cubics in sensors {
+    for cubics in &export.cubics {
         let short = short(cubics.sensor);
         for power in 1..4 {
             for (axis, letter) in LETTERS.iter().enumerate() {
@@ -169,22 +108,73 @@ fn coefficients(sensors: &[BiasCubics], imu: u8, out: &mut Vec<Parameter>) {
             }
         }
     }
+    Ok(())
 }
 
-fn parameters_of(sensors: &[BiasCubics], imu: u8, out: &mut Vec<Parameter>) -> Result<()> {
-    coefficients(sensors, imu, out);
-    for cubics in sensors {
+/// Notes on coefficients alone. ArduPilot's own calibration over temperature is made at rest too, and writes the same: it leaves the offsets to the
+/// calibrations at one temperature, with their CALTEMP. Source: libraries/AP_InertialSensor/AP_InertialSensor_tempcal.cpp, `save_calibration`.
+fn at_rest(options: &Options, accel: bool, export: &mut Export) {
+    let (imu, acc) = (options.imu, name(options, Sensor::Accel, ""));
+    export.note(format!("Scale factors and offsets stay the flight controller's own ({acc}SCAL, {acc}OFFS): a recording at rest does not show them."));
+    if accel {
+        export.note(format!("accel: ArduPilot subtracts what the bias has changed by since the temperature INS_ACC{imu}_CALTEMP of its accelerometer calibration. Repeat that calibration after loading this file if the temperature is missing there (-300)."));
+    }
+    export.note("gyro: its offsets are measured again at every start (INS_GYR_CAL), at the temperature of that start.");
+}
+
+/// Offsets at the temperature of the calibration. CALTEMP of the first unit has its number; offsets of the first unit have none.
+fn settled(options: &Options, export: &mut Export) -> Result<()> {
+    for cubics in &export.cubics {
         let Some(settled_c) = cubics.settled_c else {
             continue;
         };
-        let short = short(cubics.sensor);
-        // CALTEMP of the first unit has its number; offsets of the first unit have none.
-        let name = format!("INS_{short}{imu}_CALTEMP");
-        out.push(Parameter::real(name, settled_c));
+        let name = format!("INS_{}{}_CALTEMP", short(cubics.sensor), options.imu);
+        export.parameters.push(Parameter::real(name, settled_c));
         let settled = cubics.at(settled_c);
         for axis in 0..3 {
-            out.push(offset_parameter(cubics.sensor, axis, imu, settled[axis])?);
+            let offset = offset(options, cubics.sensor, axis, settled[axis])?;
+            export.parameters.push(offset);
         }
     }
     Ok(())
+}
+
+fn at_one_temperature(options: &Options, from: &Sources, export: &mut Export) -> Result<()> {
+    let imu = options.imu;
+    export.note(format!("ArduPilot subtracts INS_TCAL{imu}_* too: set INS_TCAL{imu}_ENABLE to 0, unless they come from a calibration without these offsets."));
+    for (sensor, offsets, scale) in options.offsets(from, export)? {
+        for (i, letter) in LETTERS.iter().enumerate() {
+            export
+                .parameters
+                .push(offset(options, sensor, i, offsets[i])?);
+            if sensor == Sensor::Accel {
+                let name = name(options, sensor, &format!("SCAL_{letter}"));
+                within((sensor, i), &name, (scale[i], 3, ""), SCALES, GIVE_FACTOR)?;
+                export.parameters.push(Parameter::real(name, scale[i]));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Parameter of an offset, SI.
+fn offset(options: &Options, sensor: Sensor, axis: usize, offset: f64) -> Result<Parameter> {
+    let name = name(options, sensor, &format!("OFFS_{}", LETTERS[axis]));
+    if sensor == Sensor::Accel {
+        let range = [-MOST_OFFSET, MOST_OFFSET];
+        let remedy = (
+            "give the raw reading that the driver treats as zero input",
+            Argument::AccelZero,
+        );
+        within((sensor, axis), &name, (offset, 3, " m/s²"), range, remedy)?;
+    }
+    Ok(Parameter::real(name, offset))
+}
+
+/// Short name of a sensor in parameter names.
+fn short(sensor: Sensor) -> &'static str {
+    match sensor {
+        Sensor::Gyro => "GYR",
+        Sensor::Accel => "ACC",
+    }
 }

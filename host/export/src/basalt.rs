@@ -8,25 +8,27 @@
 //! The other keys of the file are those of the cameras. Source: VladyslavUsenko/basalt-headers, calibration/calib_bias.hpp, `CalibAccelBias` and
 //! `CalibGyroBias`; calibration/calibration.hpp; serialization/headers_serialization.h (2021-06). Files of before 2020 have one density for three axes.
 
+use clap::Args;
 use mimu::quantity::{PerSensor, Sensor};
+use mimu_core::compensation::Affine;
 use mimu_recording::error::{Error, Result};
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Matrix3;
 use serde::Serialize;
 
-use crate::intrinsics::{Factors, Triangle};
-use crate::remaining::{self, Places};
+use crate::convention::{Bias, Convention, Factors, Parts, Shape, Triangle};
+use crate::driver::{self, Readings};
+use crate::remaining::Places;
 use crate::worst_axis::{Densities, NoiseOptions};
-use crate::{Export, Sources, driver, heading};
+use crate::{Export, Page, Sources, Target, heading};
 
 /// Options of the file.
-#[derive(Debug, Clone, Default)]
-#[cfg_attr(feature = "clap", derive(clap::Args))]
+#[derive(Debug, Clone, Default, Args)]
 pub struct Options {
     /// Options common to all noise files.
-    #[cfg_attr(feature = "clap", command(flatten))]
+    #[command(flatten)]
     pub noise: NoiseOptions,
     /// The driver's conversion.
-    #[cfg_attr(feature = "clap", command(flatten))]
+    #[command(flatten)]
     pub driver: driver::Options,
 }
 
@@ -54,83 +56,86 @@ struct Noise {
     gyro_bias_std: [f64; 3],
 }
 
-/// Text of the file.
-///
-/// # Errors
-/// The calibration or a triad of it is missing, C is singular, or an error of [`crate::worst_axis::WalkOptions::axes`].
-pub fn export(from: &Sources, options: &Options) -> Result<Export> {
-    let (calibration, place) = from.calibration()?;
-    let gyro = options.driver.readings(calibration, place, Sensor::Gyro)?;
-    let accel = options.driver.readings(calibration, place, Sensor::Accel)?;
-    // C = Qᵀ L is Cᵀ = Lᵀ Q.
-    let factors = Factors::of(&accel.inverse.matrix.transpose(), Triangle::Upper);
-    let rotation = factors.rotation;
-    let mut export = Export::new("basalt", from);
-    export.notes.extend(from.other_device());
-    export.formulas.push("calibrated = (I + S) reading - b, SI to SI, in the frame i; b first, then S by columns, of the accelerometer its lower triangle".into());
-    export.formulas.push(format!(
-        "  x_i = Q x_body, body the frame of the calibration, Q by rows = [{}]",
-        rotation
+/// The format.
+pub struct Basalt;
+
+impl Target for Basalt {
+    type Options = Options;
+    const NAME: &str = "basalt";
+    const ABOUT: &str = "Both triads and noise for Basalt: the inertial part of its calibration";
+    const CONTENTS: &str = "C and o of both triads; with `--noise` also noise";
+    const READERS: &str = "Basalt";
+    const CONVENTION: Convention = Convention::to_input(Shape::Whole, Bias::SubtractedFromInput);
+    const NOISE: crate::Noise = crate::Noise::Optional;
+    const PAGES: &[Page] = &[Page::of("Basalt", "basalt_imu.json")];
+
+    /// # Errors
+    /// The calibration or a triad of it is missing, C is singular, or an error of [`crate::worst_axis::WalkOptions::axes`].
+    fn export(from: &Sources, options: &Options) -> Result<Export> {
+        let (calibration, readings) = options.driver.both(from)?;
+        // C = Qᵀ L is Cᵀ = Lᵀ Q.
+        let c = &readings.accel.inverse.matrix;
+        let Factors { triangle, rotation } = Factors::of(&c.transpose(), Triangle::Upper);
+        let mut export = Export::new::<Self>(from);
+        export.formula("calibrated = (I + S) reading - b, SI to SI, in the frame i; b first, then S by columns, of the accelerometer its lower triangle");
+        let q: Vec<String> = rotation
             .transpose()
             .iter()
             .map(|v| format!("{v:.7}"))
-            .collect::<Vec<_>>()
-            .join(", ")
-    ));
-    export.notes.extend([accel.line(), gyro.line()]);
-    export.notes.push("Copy the keys of value0 into value0 of the calibration of the cameras, instead of those of the same names.".into());
-    export.notes.extend(heading::temperature(calibration));
-    let places = Places {
-        cross_terms: true,
-        temperature: false,
-        effects: false,
-    };
-    export.remaining = remaining::of(calibration, places)?;
-    let noise = match from.noise {
-        Some(noise) => {
-            export.formulas.push("noise_std = N and bias_std = K, continuous time, of the calibrated readings, x y z".into());
-            let axes = options
-                .noise
-                .walks
-                .axes(noise, &PerSensor::both([1.0; 3]))?;
-            Some(densities(&axes, options.noise.rate_hz(noise)))
-        }
-        None => {
-            export.notes.push("The file has no noise. Add --noise for accel_noise_std, gyro_noise_std, accel_bias_std and gyro_bias_std.".into());
-            None
-        }
-    };
-    let lower = |i: usize, j: usize| i >= j;
-    let value0 = Value0 {
-        calib_accel_bias: parameters(
-            &factors.triangle.transpose(),
-            &(rotation * accel.inverse.offset),
-            lower,
-        ),
-        calib_gyro_bias: parameters(
-            &(rotation * gyro.inverse.matrix),
-            &(rotation * gyro.inverse.offset),
-            |_, _| true,
-        ),
-        noise,
-    };
-    let about = heading::of_calibration(calibration, &export);
-    let text = serde_json::to_string_pretty(&File { value0, about }).map_err(|e| {
-        let problem = format!("it cannot be written as JSON: {e}");
-        Error::new(place, problem, "fit the recording again")
-    })?;
-    export.content = (text + "\n").into_bytes();
-    Ok(export)
+            .collect();
+        export.formula(format!(
+            "  x_i = Q x_body, body the frame of the calibration, Q by rows = [{}]",
+            q.join(", ")
+        ));
+        export.note(readings.accel.line());
+        export.note(readings.gyro.line());
+        export.note("Copy the keys of value0 into value0 of the calibration of the cameras, instead of those of the same names.");
+        export.temperature(calibration);
+        export.leaves(calibration, Places::Matrix);
+        let noise = match from.noise {
+            Some(noise) => {
+                export.formula("noise_std = N and bias_std = K, continuous time, of the calibrated readings, x y z");
+                let axes = options
+                    .noise
+                    .walks
+                    .axes(noise, &PerSensor::both([1.0; 3]))?;
+                Some(densities(&axes, options.noise.rate_hz(noise)))
+            }
+            None => {
+                export.note("The file has no noise. Add --noise for accel_noise_std, gyro_noise_std, accel_bias_std and gyro_bias_std.");
+                None
+            }
+        };
+        let in_frame = |readings: Readings, matrix: Matrix3<f64>| {
+            let offset = rotation * readings.inverse.offset;
+            let inverse = Affine { matrix, offset };
+            Self::CONVENTION.of(&Readings {
+                inverse,
+                ..readings
+            })
+        };
+        let gyro = rotation * readings.gyro.inverse.matrix;
+        let gyro = in_frame(readings.gyro, gyro)?;
+        let accel = in_frame(readings.accel, triangle.transpose())?;
+        let value0 = Value0 {
+            calib_accel_bias: parameters(&accel, |i, j| i >= j),
+            calib_gyro_bias: parameters(&gyro, |_, _| true),
+            noise,
+        };
+        let about = heading::of(&export, from);
+        let text = serde_json::to_string_pretty(&File { value0, about });
+        let text = text.map_err(|e| {
+            let problem = format!("it cannot be written as JSON: {e}");
+            Error::new("export", problem, "fit the recording again")
+        })?;
+        Ok(export.with(text + "\n"))
+    }
 }
 
 /// b and the elements of S that `has` a place, by columns.
-fn parameters(
-    matrix: &Matrix3<f64>,
-    offset: &Vector3<f64>,
-    has: impl Fn(usize, usize) -> bool,
-) -> Vec<f64> {
-    let s = matrix - Matrix3::identity();
-    let mut out: Vec<f64> = offset.iter().map(|o| -o).collect();
+fn parameters(of: &Parts, has: impl Fn(usize, usize) -> bool) -> Vec<f64> {
+    let s = of.left - Matrix3::identity();
+    let mut out: Vec<f64> = of.bias.iter().copied().collect();
     for j in 0..3 {
         out.extend((0..3).filter(|i| has(*i, j)).map(|i| s[(i, j)]));
     }

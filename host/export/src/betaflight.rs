@@ -5,58 +5,63 @@
 //! Source: betaflight/betaflight, src/main/sensors/acceleration.c, `accUpdate`, `applyAccelerationTrims`; acceleration_init.c,
 //! `performAccelerometerCalibration`; sensors/boardalignment.c; cli/settings.c, `acc_calibration` (2026-08).
 
-use mimu::quantity::{AXES, Sensor};
+use clap::Args;
+use mimu::quantity::Sensor;
 use mimu_recording::error::Result;
 
+use crate::convention::{Bias, Convention, Shape};
+use crate::driver::{self, positive};
 use crate::flight_codes::{codes, whole};
-use crate::remaining::{self, Remaining};
-use crate::{Export, Sources, driver, heading};
+use crate::remaining;
+use crate::{Export, Page, Sources, Target};
 
 /// Options of the lines.
-#[derive(Debug, Clone)]
-#[cfg_attr(feature = "clap", derive(clap::Args))]
+#[derive(Debug, Clone, Args)]
 pub struct Options {
     /// Codes of the accelerometer for 1 g: 2048 with nearly every sensor, 4096 with a BMI160, 1024 with one of 32 g
-    #[cfg_attr(feature = "clap", arg(long = "acc-1g", value_name = "CODES", default_value_t = 2048.0, value_parser = crate::options::positive))]
+    #[arg(long = "acc-1g", value_name = "CODES", default_value_t = 2048.0, value_parser = positive)]
     pub acc_1g: f64,
     /// The driver's conversion.
-    #[cfg_attr(feature = "clap", command(flatten))]
+    #[command(flatten)]
     pub driver: driver::Options,
 }
 
-/// Text of the lines.
-///
-/// # Errors
-/// No accelerometer is calibrated, C is singular, or a bias is no number of 16 bits.
-pub fn export(from: &Sources, options: &Options) -> Result<Export> {
-    let (calibration, place) = from.calibration()?;
-    let mut export = Export::new("betaflight", from);
-    export.formulas.push(format!(
-        "accel: output = code - acc_calibration on each axis of the craft (x forward, y left, z up), {} codes for 1 g",
-        options.acc_1g
-    ));
-    let accel = codes(
-        calibration,
-        place,
-        options.acc_1g,
-        &options.driver,
-        &mut export,
-    )?;
-    export.notes.push("Axes have to be those of the craft, after the alignment of sensor and board, as in accSmooth of a log. Record with acc_calibration = 0,0,0,1.".into());
-    export.notes.push("Paste the lines into the CLI. The trims for level flight (acc_trim_roll, acc_trim_pitch) are left as they are.".into());
-    export
-        .remaining
-        .push(remaining::scale_factors(Sensor::Accel, &accel.gain));
-    export
-        .remaining
-        .push(Remaining::of_rounding(Sensor::Accel, accel.step));
-    let mut zero = [0; 3];
-    for (i, axis) in AXES.iter().enumerate() {
-        zero[i] = whole(axis, "acc_calibration", accel.zero[i], [-32768, 32767])?;
+/// The format.
+pub struct Betaflight;
+
+impl Target for Betaflight {
+    type Options = Options;
+    const NAME: &str = "betaflight";
+    const ABOUT: &str = "Biases of the accelerometer for Betaflight: lines of its CLI";
+    const CONTENTS: &str = "biases of the accelerometer";
+    const READERS: &str = "Betaflight";
+    const CONVENTION: Convention =
+        Convention::to_input(Shape::Absent, Bias::SubtractedFromReadings);
+    const PAGES: &[Page] = &[Page::of("Betaflight", "betaflight.txt")];
+
+    /// # Errors
+    /// No accelerometer is calibrated, C is singular, or a bias is no number of 16 bits.
+    fn export(from: &Sources, options: &Options) -> Result<Export> {
+        let mut export = Export::new::<Self>(from);
+        export.formula(format!(
+            "accel: output = code - acc_calibration on each axis of the craft (x forward, y left, z up), {} codes for 1 g",
+            options.acc_1g
+        ));
+        let accel = codes(
+            from,
+            options.acc_1g,
+            &options.driver,
+            Self::CONVENTION,
+            &mut export,
+        )?;
+        export.note("Axes have to be those of the craft, after the alignment of sensor and board, as in accSmooth of a log. Record with acc_calibration = 0,0,0,1.");
+        export.note("Paste the lines into the CLI. The trims for level flight (acc_trim_roll, acc_trim_pitch) are left as they are.");
+        let scale = remaining::scale_factors(Sensor::Accel, &accel.gain);
+        export.remaining.push(scale);
+        export.remaining.push(accel.rounding());
+        let zero = |i: usize| whole(i, "acc_calibration", accel.zero[i], [-32768, 32767]);
+        let (x, y, z) = (zero(0)?, zero(1)?, zero(2)?);
+        let head = export.head("#", from);
+        Ok(export.with(format!("{head}set acc_calibration = {x},{y},{z},1\nsave\n")))
     }
-    let [x, y, z] = zero;
-    let mut out = heading::comments("#", &heading::of_calibration(calibration, &export));
-    out.push_str(&format!("set acc_calibration = {x},{y},{z},1\nsave\n"));
-    export.content = out.into_bytes();
-    Ok(export)
 }

@@ -1,7 +1,7 @@
 //! A C99 header: constants, and functions that convert raw readings to SI as `mimu apply` does, in single precision.
 //!
-//! The header needs only `<math.h>`, and that only if something depends on temperature or time. It computes the same as [`mimu_core::compensator`],
-//! in the same order:
+//! The code is fixed (`c/calibration.h.in`); tables and the errors of effects are written from the calibration. The header needs only `<math.h>`, and
+//! that only if something depends on temperature or time. It computes the same as [`mimu_core::compensator`], in the same order:
 //!
 //! 1. converter nonlinearity is removed from the raw reading, and `x = C u + o` (`PREFIX_gyro`, `PREFIX_accel`);
 //! 2. C and o at the temperature of the dies, by cubic Hermite pieces as in [`mimu_core::table`] behind the lag of
@@ -10,73 +10,77 @@
 //!    ([`mimu::effects::regressor`]), so that a new effect needs nothing here.
 
 mod effects;
-mod functions;
 
-use std::fmt::Write as _;
-
+use clap::Args;
 use mimu::calibration::Calibration;
-use mimu::quantity::{PerSensor, Sensor};
+use mimu::quantity::Sensor;
 use mimu_core::compensation::Affine;
+use mimu_core::die::{BEYOND_C, RATE_SHARE};
+use mimu_core::effects::REFERENCE_C;
 use mimu_recording::error::{Argument, Error, Result};
+use nalgebra::Matrix3;
+use serde_json::{Value, json};
 
-use crate::remaining::{self, Places};
-use crate::{Export, Sources, heading};
+use crate::remaining::Places;
+use crate::template::fill;
+use crate::{Export, Page, Sources, Target};
 use effects::Effects;
 
 /// Options of the header.
-#[derive(Debug, Clone)]
-#[cfg_attr(feature = "clap", derive(clap::Args))]
+#[derive(Debug, Clone, Args)]
 pub struct Options {
     /// Beginning of every name in the header
-    #[cfg_attr(
-        feature = "clap",
-        arg(long, value_name = "NAME", default_value = "mimu")
-    )]
+    #[arg(long, value_name = "NAME", default_value = "mimu")]
     pub prefix: String,
 }
 
-/// Text of the header.
-///
-/// # Errors
-/// The calibration is missing, the prefix is not a valid C identifier, or an effect cannot be removed on a device.
-pub fn export(from: &Sources, options: &Options) -> Result<Export> {
-    let (calibration, _) = from.calibration()?;
-    let prefix = options.prefix.as_str();
-    let mut letters = prefix.chars();
-    let first = letters.next().is_some_and(|c| c.is_ascii_alphabetic());
-    if !(first && letters.all(|c| c.is_ascii_alphanumeric() || c == '_')) {
-        return Err(Error::new(
-            "prefix",
-            format!("{prefix:?} is not a name in C"),
-            "use letters, digits and underscores, a letter first",
-        )
-        .about(Argument::Prefix));
+/// The format.
+pub struct C;
+
+impl Target for C {
+    type Options = Options;
+    const NAME: &str = "c";
+    const ABOUT: &str = "A C99 header: constants, and functions that convert raw readings to SI";
+    const CONTENTS: &str = "everything: affine model, curves, lags of the dies, effects";
+    const READERS: &str = "any C99 compiler";
+    const PAGES: &[Page] = &[Page::of("C header", "mimu.h")];
+
+    /// # Errors
+    /// The calibration is missing, the prefix is not a valid C identifier, or an effect cannot be removed on a device.
+    fn export(from: &Sources, options: &Options) -> Result<Export> {
+        let (calibration, _) = from.calibration()?;
+        let prefix = options.prefix.as_str();
+        let mut letters = prefix.chars();
+        let first = letters.next().is_some_and(|c| c.is_ascii_alphabetic());
+        if !(first && letters.all(|c| c.is_ascii_alphanumeric() || c == '_')) {
+            return Err(Error::new(
+                "prefix",
+                format!("{prefix:?} is not a name in C"),
+                "use letters, digits and underscores, a letter first",
+            )
+            .about(Argument::Prefix));
+        }
+        let effects = Effects::of(calibration)?;
+        let header = Header {
+            prefix,
+            calibration,
+            effects: &effects,
+        };
+        let mut export = Export::new::<Self>(from);
+        let mut values = header.values();
+        let formulas = fill(include_str!("c/formulas.in"), &values);
+        export.formulas = formulas.lines().map(String::from).collect();
+        let places = match effects.left_out {
+            0 => Places::Effects,
+            _ => Places::Curves,
+        };
+        export.leaves(calibration, places);
+        let written = |source: &String| effects.written.contains(source);
+        export.remaining.retain(|r| !written(&r.source));
+        export.note("Single precision rounds: see docs/export.md for the bound; it is below 1e-6 of the largest term of the sum.");
+        values["comments"] = export.head("//", from).into();
+        Ok(export.with(fill(include_str!("c/calibration.h.in"), &values)))
     }
-    let effects = Effects::of(calibration)?;
-    let header = Header {
-        prefix,
-        calibration,
-        effects: &effects,
-    };
-    let mut export = Export::new("c", from);
-    export.formulas = header.formulas();
-    let places = Places {
-        cross_terms: true,
-        temperature: true,
-        effects: effects.left_out.is_empty(),
-    };
-    let remaining = remaining::of(calibration, places)?;
-    let written = |source: &String| effects.written.contains(source);
-    export.remaining = remaining
-        .into_iter()
-        .filter(|r| !written(&r.source))
-        .collect();
-    export.notes.push(
-        "Single precision rounds: see docs/export.md for the bound; it is below 1e-6 of the largest term of the sum.".into(),
-    );
-    let comments = heading::comments("//", &heading::of_calibration(calibration, &export));
-    export.content = header.text(&comments).into_bytes();
-    Ok(export)
 }
 
 /// Everything that the header is written from.
@@ -114,122 +118,114 @@ impl Header<'_> {
         self.follows() || !self.effects.is_empty()
     }
 
-    fn lags_s(&self) -> PerSensor<f64> {
-        let over = self.calibration.temperature.as_ref();
-        over.and_then(|over| over.lags_s()).unwrap_or_default()
-    }
-
-    fn formulas(&self) -> Vec<String> {
+    /// The calls in their order.
+    fn calls(&self) -> String {
         let prefix = self.prefix;
-        let mut lines = vec![
-            "x = C u + o, raw to SI, C by rows: x[i] = C[i][0] u[0] + C[i][1] u[1] + C[i][2] u[2] + o[i].".to_string(),
-        ];
-        let state = match self.has_state() {
-            true => format!("{prefix}_state s; {prefix}_start(&s); "),
-            false => String::new(),
-        };
-        let follow = match self.follows() {
-            true => format!("several times per second {prefix}_follow(&s, dt_s, temp_c); "),
-            false => String::new(),
-        };
-        let of = |sensor: Sensor| match self.has_curves(sensor) {
-            true => format!("{prefix}_{sensor}(&s, raw, x); "),
-            false => format!("{prefix}_{sensor}(raw, x); "),
-        };
-        let each: String = self.sensors().map(of).collect();
-        let remove = match self.effects.is_empty() {
-            true => String::new(),
-            false => format!("{prefix}_remove_effects(&s, rate, force); "),
-        };
-        let all = format!("{state}{follow}with every sample {each}{remove}");
-        lines.push(format!("Use: {}.", all.trim_end_matches("; ")));
-        let array = |sensor: Sensor| {
-            let (raw, [x, y, z], out, unit) = match sensor {
-                Sensor::Gyro => ("g", ["gx", "gy", "gz"], "rate", "rad/s"),
-                Sensor::Accel => (
-                    "a",
-                    ["ax", "ay", "az"],
-                    "force",
-                    "m/s^2, at rest it points up",
-                ),
-            };
-            let state = if self.has_curves(sensor) { "&s, " } else { "" };
-            format!(
-                "  float {raw}[3] = {{(float){x}, (float){y}, (float){z}}}, {out}[3]; {prefix}_{sensor}({state}{raw}, {out});  // {unit}"
-            )
-        };
-        lines.push("Readings are floats in the order x, y, z, raw as they are read, at the range that was calibrated:".into());
-        lines.extend(self.sensors().map(array));
-        if self.follows() {
-            lines.push(format!(
-                "{prefix}_follow takes the time in s since its last call (first call: since power-on) and the thermometer in degrees Celsius, NAN if it has no reading."
-            ));
-        }
-        if self.follows_dies() {
-            lines.push("Over temperature C and o are cubic Hermite segments between nodes; outside they continue along the slope for 5 K and are constant beyond.".into());
-        }
-        if !self.effects.written.is_empty() {
-            lines.push(format!(
-                "Effects that it removes: {}.",
-                self.effects.written.join(", ")
-            ));
-        }
-        lines
-    }
-
-    fn text(&self, comments: &str) -> String {
-        let guard = format!("{}_H", self.prefix.to_uppercase());
-        let mut out = format!("{comments}\n#ifndef {guard}\n#define {guard}\n\n");
+        let mut calls = String::new();
         if self.has_state() {
-            out += "#include <math.h>\n\n";
+            calls += &format!("{prefix}_state s; {prefix}_start(&s); ");
         }
-        self.constants(&mut out);
-        self.functions(&mut out);
-        let _ = writeln!(out, "#endif");
-        out
+        if self.follows() {
+            calls += &format!("several times per second {prefix}_follow(&s, dt_s, temp_c); ");
+        }
+        let each = |s| format!("{prefix}_{s}({}raw, x)", self.with(s));
+        let mut each: Vec<String> = self.sensors().map(each).collect();
+        if !self.effects.is_empty() {
+            each.push(format!("{prefix}_remove_effects(&s, rate, force)"));
+        }
+        format!("{calls}with every sample {}", each.join("; "))
     }
 
-    fn constants(&self, out: &mut String) {
-        let prefix = self.prefix;
-        for sensor in self.sensors() {
-            let (Some(model), Some(table)) = (
-                self.calibration.inverse(sensor),
-                self.calibration.table(sensor),
-            ) else {
-                continue;
+    /// The first argument of the function of a sensor.
+    fn with(&self, sensor: Sensor) -> &'static str {
+        if self.has_curves(sensor) { "&s, " } else { "" }
+    }
+
+    /// Values of the template.
+    fn values(&self) -> Value {
+        let mut values = self.effects.values();
+        let over = self.calibration.temperature.as_ref();
+        let nodes = over.map_or(&[][..], |over| &over.nodes);
+        let dies: Vec<Value> = self.dies();
+        let is_lagged = |die: &Value| die["lagged"] == true;
+        let lagging = dies.iter().any(is_lagged) || values["lags"] != json!([]);
+        let more = json!({
+            "use": self.calls(),
+            "written": self.effects.written.join(", "),
+            "prefix": self.prefix,
+            "PREFIX": self.prefix.to_uppercase(),
+            "state": self.has_state(),
+            "follows": self.follows(),
+            "over_temperature": over.is_some(),
+            "count": nodes.len(),
+            "node_c": list(nodes.iter().map(|node| node.temp_c)),
+            "sensors": self.sensors().filter_map(|s| self.sensor(s)).collect::<Value>(),
+            "dies": dies,
+            "lagging": lagging,
+            "reference": number(REFERENCE_C),
+            "reference_c": REFERENCE_C.to_string(),
+            "beyond": number(BEYOND_C),
+        });
+        if let (Value::Object(all), Value::Object(more)) = (&mut values, more) {
+            all.extend(more);
+        }
+        values
+    }
+
+    fn sensor(&self, sensor: Sensor) -> Option<Value> {
+        let model = self.calibration.inverse(sensor)?;
+        let table = self.calibration.table(sensor)?;
+        let (raw, own, own_unit) = match sensor {
+            Sensor::Gyro => ("g", "rate", "rad/s"),
+            Sensor::Accel => ("a", "force", "m/s^2, at rest it points up"),
+        };
+        Some(json!({
+            "sensor": sensor.name(),
+            "raw": raw,
+            "own": own,
+            "own_unit": own_unit,
+            "with": self.with(sensor),
+            "unit": sensor.unit(),
+            "table_unit": table.unit,
+            "raw_unit": table.raw_unit.to_string(),
+            "curves": self.has_curves(sensor),
+            "C": rows(&model.matrix),
+            "o": list(model.offset.iter().copied()),
+        }))
+    }
+
+    /// Sensors with curves: their nodes, and the filter of their dies' lag.
+    fn dies(&self) -> Vec<Value> {
+        let Some(over) = &self.calibration.temperature else {
+            return Vec::new();
+        };
+        let of = |sensor: Sensor| {
+            let tables = over.nodes.iter().filter_map(|node| node.table(sensor));
+            let nodes = tables.map(|table| {
+                let [model, slope] = [table.model(), table.slope()].map(|m| list(twelve(&m)));
+                json!({"model": model, "slope": slope})
+            });
+            // The filter's time constant, s, and the factor of the filtered minus the unfiltered temperature.
+            let lag_s = over.lags_s().unwrap_or_default()[sensor];
+            let (filter_s, factor) = match lag_s < 0.0 {
+                true => (-lag_s * RATE_SHARE, -1.0 / RATE_SHARE),
+                false => (lag_s, 1.0),
             };
-            let (unit, raw) = (&table.unit, &table.raw_unit);
-            if !self.has_curves(sensor) {
-                let rows = [0, 1, 2].map(|i| list([0, 1, 2].map(|j| model.matrix[(i, j)])));
-                let _ = writeln!(
-                    out,
-                    "// C of the {sensor}, {unit} per {raw}, and o, {unit}.\nstatic const float {prefix}_{sensor}_C[3][3] = {{\n    {}}};\nstatic const float {prefix}_{sensor}_o[3] = {};\n",
-                    rows.join(",\n    "),
-                    list(model.offset.iter().copied())
-                );
-            }
-        }
-        if let Some(over) = &self.calibration.temperature {
-            let count = over.nodes.len();
-            let temperatures = list(over.nodes.iter().map(|node| node.temp_c));
-            let _ = writeln!(
-                out,
-                "// Temperatures of the dies at the nodes, degrees Celsius.\n#define {}_NODES {count}\nstatic const float {prefix}_node_c[{count}] = {temperatures};\n",
-                prefix.to_uppercase()
-            );
-            for sensor in self.sensors().filter(|s| self.has_curves(*s)) {
-                let _ = writeln!(
-                    out,
-                    "// Of the {sensor} at each node: C by rows and o, then their derivatives per kelvin.\nstatic const float {prefix}_{sensor}_nodes[{count}][2][12] = {{"
-                );
-                for table in over.nodes.iter().filter_map(|node| node.table(sensor)) {
-                    let [model, slope] = [table.model(), table.slope()].map(|m| list(twelve(&m)));
-                    let _ = writeln!(out, "    {{{model},\n     {slope}}},");
-                }
-                out.push_str("};\n\n");
-            }
-        }
-        self.effects.constants(prefix, out);
+            let die = match (filter_s > 0.0, factor == 1.0) {
+                (false, _) => "now".into(),
+                (_, true) => format!("now + s->{sensor}_behind"),
+                (_, false) => format!("now + {} * s->{sensor}_behind", number(factor)),
+            };
+            json!({
+                "sensor": sensor.name(),
+                "nodes": nodes.collect::<Value>(),
+                "lagged": filter_s > 0.0,
+                "filter_s": number(filter_s),
+                "die": die,
+            })
+        };
+        let all = self.sensors().filter(|s| self.has_curves(*s));
+        all.map(of).collect()
     }
 }
 
@@ -248,4 +244,11 @@ fn number(value: f64) -> String {
 fn list(values: impl IntoIterator<Item = f64>) -> String {
     let all: Vec<String> = values.into_iter().map(number).collect();
     format!("{{{}}}", all.join(", "))
+}
+
+/// A matrix by rows, without the outer braces.
+fn rows(matrix: &Matrix3<f64>) -> String {
+    let rows = matrix.row_iter();
+    let rows: Vec<String> = rows.map(|row| list(row.iter().copied())).collect();
+    rows.join(",\n    ")
 }

@@ -3,22 +3,30 @@
 use mimu_device::Image;
 use mimu_recording::error::Result;
 
-use crate::{Export, Sources};
+use crate::{Export, Nothing, Page, Sources, Target};
 
-/// The encoded calibration.
-///
-/// # Errors
-/// The errors of [`Image::new`]: a triad is missing, readings are in SI, or an effect cannot be removed on a device.
-pub fn export(from: &Sources) -> Result<Export> {
-    let (calibration, place) = from.calibration()?;
-    let image = Image::new(calibration, place)?;
-    let mut export = Export::new("core", from);
-    export.notes.push(format!("hash {}", image.hash));
-    if !image.effects.is_empty() {
-        let effects = format!("effects: {}", image.effects.join(", "));
-        export.notes.push(effects);
+/// The format.
+pub struct Core;
+
+impl Target for Core {
+    type Options = Nothing;
+    const NAME: &str = "core";
+    const ABOUT: &str = "The bytes that a device stores, for programs with mimu-core";
+    const CONTENTS: &str = "everything, as the bytes that a device stores";
+    const READERS: &str = "Rust programs with `mimu-core`";
+    const PAGES: &[Page] = &[Page::of("bytes for mimu-core", "calibration.bin")];
+
+    /// # Errors
+    /// The errors of [`Image::new`]: a triad is missing, readings are in SI, or an effect cannot be removed on a device.
+    fn export(from: &Sources, _: &Nothing) -> Result<Export> {
+        let (calibration, place) = from.calibration()?;
+        let image = Image::new(calibration, place)?;
+        let mut export = Export::new::<Self>(from);
+        export.note(format!("hash {}", image.hash));
+        if !image.effects.is_empty() {
+            export.note(format!("effects: {}", image.effects.join(", ")));
+        }
+        export.notes.extend(image.warnings);
+        Ok(export.with(image.bytes))
     }
-    export.notes.extend(image.warnings);
-    export.content = image.bytes;
-    Ok(export)
 }

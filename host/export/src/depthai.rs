@@ -7,85 +7,80 @@
 //! Source: luxonis/depthai-core 3.6, include/depthai/common/ImuParameters.hpp, `ImuCalibrationParams`; the test of the camera's streams, "runtime
 //! calibration applies bias offsets" and `applyCalibration`; device/CalibrationHandler.hpp, `setAccelerometerCalibration` (2026-04).
 
+use clap::Args;
 use mimu::quantity::{AXES, PerSensor, Sensor};
 use mimu_recording::error::Result;
 use serde_json::{Map, Value, json};
 
-use crate::driver::Readings;
-use crate::remaining::{self, Places};
+use crate::convention::{Bias, Convention, Parts, Shape};
+use crate::remaining::Places;
 use crate::worst_axis::{self, WalkOptions};
-use crate::{Export, Sources, driver, heading};
+use crate::{Export, Noise, Page, Sources, Target, driver, heading};
 
 /// Options of the file.
-#[derive(Debug, Clone, Default)]
-#[cfg_attr(feature = "clap", derive(clap::Args))]
+#[derive(Debug, Clone, Default, Args)]
 pub struct Options {
     /// Type of the inertial unit, as DepthAI names it, such as BMI270
-    #[cfg_attr(feature = "clap", arg(long, value_name = "NAME", default_value = ""))]
+    #[arg(long, value_name = "NAME", default_value = "")]
     pub imu: String,
     /// Random walks.
-    #[cfg_attr(feature = "clap", command(flatten))]
+    #[command(flatten)]
     pub walks: WalkOptions,
     /// The driver's conversion.
-    #[cfg_attr(feature = "clap", command(flatten))]
+    #[command(flatten)]
     pub driver: driver::Options,
 }
 
-/// Text of the file.
-///
-/// # Errors
-/// The calibration or a triad of it is missing, C is singular, or an error of [`WalkOptions::axes`].
-pub fn export(from: &Sources, options: &Options) -> Result<Export> {
-    let (calibration, place) = from.calibration()?;
-    let readings = PerSensor {
-        gyro: options.driver.readings(calibration, place, Sensor::Gyro)?,
-        accel: options.driver.readings(calibration, place, Sensor::Accel)?,
-    };
-    let mut export = Export::new("depthai", from);
-    export.notes.extend(from.other_device());
-    export.formulas.push(
-        "calibrated = Q uncalibrated + b, SI to SI, b is added; three rows [q0, q1, q2, b] for each triad".into(),
-    );
-    export
-        .notes
-        .extend([readings.accel.line(), readings.gyro.line()]);
-    export.notes.push("Record the streams ACCELEROMETER_UNCALIBRATED and GYROSCOPE_UNCALIBRATED: they have the camera's axes, and no calibration.".into());
-    export.notes.push("Merge the file into the camera's calibration: update eepromToJson()[\"imuCalibrationParams\"] with it, then fromJson() and device.setCalibration() or flashCalibration().".into());
-    export.notes.extend(heading::temperature(calibration));
-    let places = Places {
-        cross_terms: true,
-        temperature: false,
-        effects: false,
-    };
-    export.remaining = remaining::of(calibration, places)?;
-    let mut triads = Map::new();
-    for (name, readings) in [
-        ("accelerometer", &readings.accel),
-        ("gyroscope", &readings.gyro),
-    ] {
-        triads.insert(name.into(), rows(readings));
-    }
-    match from.noise {
-        Some(_) => {
-            triads.insert("noise".into(), noise(from, options, &mut export)?);
+/// The format.
+pub struct DepthAi;
+
+impl Target for DepthAi {
+    type Options = Options;
+    const NAME: &str = "depthai";
+    const ABOUT: &str = "Both triads and noise for an OAK camera: imuCalibrationParams of DepthAI";
+    const CONTENTS: &str = "C and o of both triads; with `--noise` also noise";
+    const READERS: &str = "OAK cameras, DepthAI 3.6";
+    const CONVENTION: Convention = Convention::to_input(Shape::Whole, Bias::AddedToInput);
+    const NOISE: Noise = Noise::Optional;
+    const PAGES: &[Page] = &[Page::of("OAK cameras (DepthAI)", "imu.json")];
+
+    /// # Errors
+    /// The calibration or a triad of it is missing, C is singular, or an error of [`WalkOptions::axes`].
+    fn export(from: &Sources, options: &Options) -> Result<Export> {
+        let (calibration, readings) = options.driver.both(from)?;
+        let mut export = Export::new::<Self>(from);
+        export.formula("calibrated = Q uncalibrated + b, SI to SI, b is added; three rows [q0, q1, q2, b] for each triad");
+        export.note(readings.accel.line());
+        export.note(readings.gyro.line());
+        export.note("Record the streams ACCELEROMETER_UNCALIBRATED and GYROSCOPE_UNCALIBRATED: they have the camera's axes, and no calibration.");
+        export.note("Merge the file into the camera's calibration: update eepromToJson()[\"imuCalibrationParams\"] with it, then fromJson() and device.setCalibration() or flashCalibration().");
+        export.temperature(calibration);
+        export.leaves(calibration, Places::Matrix);
+        let mut triads = json!({
+            "accelerometer": rows(&Self::CONVENTION.of(&readings.accel)?),
+            "gyroscope": rows(&Self::CONVENTION.of(&readings.gyro)?),
+        });
+        match from.noise {
+            Some(_) => triads["noise"] = noise(from, options, &mut export)?,
+            None => {
+                export
+                    .note("The file has no noise: the camera keeps its own. Add --noise for one.");
+            }
         }
-        None => export
-            .notes
-            .push("The file has no noise: the camera keeps its own. Add --noise for one.".into()),
+        let about = heading::of(&export, from);
+        let value = json!({"about": about, "imuCalibrationParams": triads});
+        Ok(export.with(format!("{value:#}\n")))
     }
-    let value = json!({
-        "about": heading::of_calibration(calibration, &export),
-        "imuCalibrationParams": triads,
-    });
-    export.content = (format!("{value:#}") + "\n").into_bytes();
-    Ok(export)
 }
 
-fn rows(readings: &Readings) -> Value {
-    let inverse = &readings.inverse;
+fn rows(of: &Parts) -> Value {
     let row = |i: usize| {
-        let q = inverse.matrix.row(i);
-        json!([q[0], q[1], q[2], inverse.offset[i]])
+        json!([
+            of.left[(i, 0)],
+            of.left[(i, 1)],
+            of.left[(i, 2)],
+            of.bias[i]
+        ])
     };
     json!([row(0), row(1), row(2)])
 }
@@ -94,16 +89,15 @@ fn rows(readings: &Readings) -> Value {
 fn noise(from: &Sources, options: &Options, export: &mut Export) -> Result<Value> {
     let noise = from.noise()?;
     let axes = options.walks.axes(noise, &PerSensor::both([1.0; 3]))?;
-    export.formulas.push("noiseDensity = N and randomWalk = K, continuous time, biasStability = B, of the calibrated readings in SI; 0 is not known".into());
+    export.formula("noiseDensity = N and randomWalk = K, continuous time, biasStability = B, of the calibrated readings in SI; 0 is not known");
     let triad = |sensor: Sensor| {
         let mut out = Map::new();
         for (axis, densities) in AXES.iter().zip(&axes[sensor]) {
             let instability = worst_axis::instability(noise, sensor, axis);
             if instability.is_none() {
-                let note = format!(
+                export.note(format!(
                     "{sensor}, {axis}: the record shows no bias instability, so biasStability is 0."
-                );
-                export.notes.push(note);
+                ));
             }
             let value = json!({
                 "noiseDensity": densities.white.value,

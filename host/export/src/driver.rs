@@ -3,6 +3,7 @@
 //! Many programs receive readings that a driver has converted axis by axis: `y_i = si_per_raw_i (u_i - zero_i)`. Their calibrations apply to y, while
 //! a calibration file applies to the raw readings u.
 
+use clap::Args;
 use mimu::calibration::Calibration;
 use mimu::calibration::bias_cubic::{Conversion, KnownConversion};
 use mimu::quantity::{PerSensor, Sensor};
@@ -12,21 +13,22 @@ use mimu_recording::RawUnit;
 use mimu_recording::error::{Argument, Error, Result};
 use nalgebra::{Matrix3, Vector3};
 
+use crate::Sources;
+
 /// The user's knowledge of the driver.
-#[derive(Debug, Clone, Default)]
-#[cfg_attr(feature = "clap", derive(clap::Args))]
+#[derive(Debug, Clone, Default, Args)]
 pub struct Options {
     /// rad/s per raw unit by which the driver converts; without it as the calibration does, and 1 for readings in SI
-    #[cfg_attr(feature = "clap", arg(long, value_name = "SI", value_parser = crate::options::positive))]
+    #[arg(long, value_name = "SI", value_parser = positive)]
     pub gyro_si_per_raw: Option<f64>,
     /// m/s² per raw unit by which the driver converts; likewise
-    #[cfg_attr(feature = "clap", arg(long, value_name = "SI", value_parser = crate::options::positive))]
+    #[arg(long, value_name = "SI", value_parser = positive)]
     pub accel_si_per_raw: Option<f64>,
     /// Raw reading that the driver takes for no rate; without it 0
-    #[cfg_attr(feature = "clap", arg(long, value_name = "RAW", allow_negative_numbers = true, value_parser = crate::options::finite))]
+    #[arg(long, value_name = "RAW", allow_negative_numbers = true, value_parser = finite)]
     pub gyro_zero: Option<f64>,
     /// Raw reading that the driver takes for no force; without it 0
-    #[cfg_attr(feature = "clap", arg(long, value_name = "RAW", allow_negative_numbers = true, value_parser = crate::options::finite))]
+    #[arg(long, value_name = "RAW", allow_negative_numbers = true, value_parser = finite)]
     pub accel_zero: Option<f64>,
 }
 
@@ -45,16 +47,14 @@ pub struct Readings {
 
 impl Options {
     /// Conversions of the drivers, as far as the user knows them.
-    pub fn conversions(&self) -> PerSensor<KnownConversion> {
+    pub(crate) fn conversions(&self) -> PerSensor<KnownConversion> {
+        let of = |si_per_raw, zero_raw| KnownConversion {
+            si_per_raw,
+            zero_raw,
+        };
         PerSensor {
-            gyro: KnownConversion {
-                si_per_raw: self.gyro_si_per_raw,
-                zero_raw: self.gyro_zero,
-            },
-            accel: KnownConversion {
-                si_per_raw: self.accel_si_per_raw,
-                zero_raw: self.accel_zero,
-            },
+            gyro: of(self.gyro_si_per_raw, self.gyro_zero),
+            accel: of(self.accel_si_per_raw, self.accel_zero),
         }
     }
 
@@ -64,34 +64,19 @@ impl Options {
     ///
     /// An option is given.
     pub fn unused(&self) -> Result<()> {
+        #[rustfmt::skip]
         let given = [
-            (
-                Argument::GyroConversion,
-                "conversion of the gyro",
-                self.gyro_si_per_raw,
-            ),
-            (
-                Argument::AccelConversion,
-                "conversion of the accelerometer",
-                self.accel_si_per_raw,
-            ),
+            (Argument::GyroConversion, "conversion of the gyro", self.gyro_si_per_raw),
+            (Argument::AccelConversion, "conversion of the accelerometer", self.accel_si_per_raw),
             (Argument::GyroZero, "zero of the gyro", self.gyro_zero),
-            (
-                Argument::AccelZero,
-                "zero of the accelerometer",
-                self.accel_zero,
-            ),
+            (Argument::AccelZero, "zero of the accelerometer", self.accel_zero),
         ];
-        match given.iter().find(|(.., value)| value.is_some()) {
-            None => Ok(()),
-            Some((argument, name, _)) => Err(Error::new(
-                *name,
-                "this option needs a calibration",
-                "give a calibration too, or leave the option out",
-            )
-            .about(*argument)
-            .about(Argument::Calibration)),
-        }
+        let Some((argument, name, _)) = given.iter().find(|(.., value)| value.is_some()) else {
+            return Ok(());
+        };
+        let remedy = "give a calibration too, or leave the option out";
+        let error = Error::new(*name, "this option needs a calibration", remedy);
+        Err(error.about(*argument).about(Argument::Calibration))
     }
 
     /// Refuses readings that are not in SI without the factor of the driver: the calibration's own would leave no error of the scale factors to export.
@@ -115,6 +100,16 @@ impl Options {
         .about(argument))
     }
 
+    /// The driver's readings of both triads of the calibration.
+    ///
+    /// # Errors
+    /// The calibration is missing, or those of [`Self::readings`].
+    pub fn both<'a>(&self, from: &Sources<'a>) -> Result<(&'a Calibration, PerSensor<Readings>)> {
+        let (calibration, place) = from.calibration()?;
+        let [gyro, accel] = Sensor::BOTH.map(|s| self.readings(calibration, place, s));
+        Ok((calibration, PerSensor::from([gyro?, accel?])))
+    }
+
     /// The driver's readings of `sensor`. If no factor is given, it is 1 for readings in SI, and otherwise one over the scale factor of the axis: the
     /// best conversion by three factors.
     ///
@@ -131,11 +126,8 @@ impl Options {
             Error::new(place, problem, "fit a recording that determines it")
         })?;
         let raw = Forward::of(&model).ok_or_else(|| {
-            Error::new(
-                place,
-                format!("C of the {sensor} is singular"),
-                "fit the recording again",
-            )
+            let problem = format!("C of the {sensor} is singular");
+            Error::new(place, problem, "fit the recording again")
         })?;
         let known = self.conversions()[sensor];
         let si = calibration.recording.raw_unit == RawUnit::Si;
@@ -161,6 +153,36 @@ impl Options {
                 offset: model.matrix * zero + model.offset,
             },
         })
+    }
+}
+
+/// Raw readings of `sensor`, for programs that take them.
+///
+/// # Errors
+/// Those of [`Options::readings`].
+pub fn raw(calibration: &Calibration, place: &str, sensor: Sensor) -> Result<Readings> {
+    let one = Options {
+        gyro_si_per_raw: Some(1.0),
+        accel_si_per_raw: Some(1.0),
+        ..Options::default()
+    };
+    one.readings(calibration, place, sensor)
+}
+
+/// A number greater than 0, as an option.
+pub(crate) fn positive(text: &str) -> std::result::Result<f64, String> {
+    match finite(text)? {
+        value if value > 0.0 => Ok(value),
+        _ => Err("it has to be greater than 0".into()),
+    }
+}
+
+/// A finite number, as an option.
+fn finite(text: &str) -> std::result::Result<f64, String> {
+    let value: f64 = text.parse().map_err(|_| "it is not a number".to_string())?;
+    match value.is_finite() {
+        true => Ok(value),
+        false => Err("it is not a finite number".into()),
     }
 }
 

@@ -5,56 +5,61 @@
 //! Source: hku-mars/FAST_LIO, src/IMU_Processing.hpp, `UndistortPcl`; include/IKFoM_toolkit/esekfom/esekfom.hpp, `predict` (2024-07);
 //! config/*.yaml on main and on its branch ROS2.
 
+use clap::Args;
+use mimu::quantity::Sensor::{Accel, Gyro};
+use mimu_allan::model::Term::{K, N};
 use mimu_recording::error::Result;
 
-use crate::worst_axis::{NoiseOptions, line};
-use crate::{Export, Sources, heading};
+use crate::worst_axis::{NoiseOptions, keys_file};
+use crate::{Export, Noise, Page, Sources, Target};
 
 /// Options of the file.
-#[derive(Debug, Clone)]
-#[cfg_attr(feature = "clap", derive(clap::Args))]
+#[derive(Debug, Clone, Args)]
 pub struct Options {
     /// Layout of parameters in ROS 2
-    #[cfg_attr(feature = "clap", arg(long))]
+    #[arg(long)]
     pub ros2: bool,
     /// Options common to all noise files.
-    #[cfg_attr(feature = "clap", command(flatten))]
+    #[command(flatten)]
     pub noise: NoiseOptions,
 }
 
-/// The keys of the inertial unit.
-///
-/// # Errors
-/// The noise is missing, or an error of [`crate::worst_axis::WalkOptions::densities`].
-pub fn export(from: &Sources, options: &Options) -> Result<Export> {
-    let noise = from.noise()?;
-    let densities = options.noise.walks.calibrated(noise)?;
-    let rate = options.noise.rate_hz(noise);
-    let mut export = Export::new("fastlio", from);
-    export.formulas.push(format!(
-        "Variances of one sample at {rate:.3} Hz: acc_cov = N^2 rate, b_acc_cov = K^2 rate, and so for the gyro; the worst axis, with the {} % interval behind each.",
-        100.0 * noise.confidence
-    ));
-    export
-        .notes
-        .push("Copy these keys into the configuration of FAST-LIO.".into());
-    export.notes.extend(heading::needs_calibrated(from));
-    let mut out = heading::comments("#", &heading::of_noise(noise, &export));
-    let (layout, indent) = match options.ros2 {
-        true => ("/**:\n  ros__parameters:\n    mapping:\n", "      "),
-        false => ("mapping:\n", "  "),
-    };
-    out.push_str(layout);
-    let keys = [
-        ("acc_cov", "(m/s^2)^2", &densities.accel.white),
-        ("gyr_cov", "(rad/s)^2", &densities.gyro.white),
-        ("b_acc_cov", "(m/s^3)^2", &densities.accel.walk),
-        ("b_gyr_cov", "(rad/s^2)^2", &densities.gyro.walk),
-    ];
-    for (key, unit, density) in keys {
-        let variance = |density: f64| density * density * rate;
-        out.push_str(&line(indent, key, variance, unit, density));
+/// The format.
+pub struct FastLio;
+
+impl Target for FastLio {
+    type Options = Options;
+    const NAME: &str = "fastlio";
+    const ABOUT: &str = "Noise for FAST-LIO";
+    const CONTENTS: &str = "variances of one sample";
+    const READERS: &str = "FAST-LIO (`--ros2` likewise)";
+    const NOISE: Noise = Noise::Only;
+    const PAGES: &[Page] = &[Page::of("FAST-LIO", "fastlio.yaml")];
+
+    /// # Errors
+    /// The noise is missing, or an error of [`crate::worst_axis::WalkOptions::densities`].
+    fn export(from: &Sources, options: &Options) -> Result<Export> {
+        let noise = from.noise()?;
+        let rate = options.noise.rate_hz(noise);
+        let mut export = Export::new::<Self>(from);
+        export.formula(format!(
+            "Variances of one sample at {rate:.3} Hz: acc_cov = N^2 rate, b_acc_cov = K^2 rate, and so for the gyro; the worst axis, with the {} % interval behind each.",
+            100.0 * noise.confidence
+        ));
+        export.note("Copy these keys into the configuration of FAST-LIO.");
+        let (layout, indent) = match options.ros2 {
+            true => ("/**:\n  ros__parameters:\n    mapping:\n", "      "),
+            false => ("mapping:\n", "  "),
+        };
+        let keys = [
+            ("acc_cov", "(m/s^2)^2", Accel, N),
+            ("gyr_cov", "(rad/s)^2", Gyro, N),
+            ("b_acc_cov", "(m/s^3)^2", Accel, K),
+            ("b_gyr_cov", "(rad/s^2)^2", Gyro, K),
+        ];
+        let text = ["", layout, indent];
+        keys_file(export, from, &options.noise.walks, text, keys, |density| {
+            density * density * rate
+        })
     }
-    export.content = out.into_bytes();
-    Ok(export)
 }

@@ -9,84 +9,82 @@ use std::fmt::Write as _;
 
 use mimu::quantity::Sensor;
 use mimu::readable::STANDARD_GRAVITY;
-use mimu::triad::Forward;
-use mimu_recording::error::{Error, Result};
+use mimu_recording::error::Result;
 
-use crate::misalignment::Misalignment;
-use crate::remaining::{self, Places};
-use crate::{Export, Sources, heading};
+use crate::convention::{Bias, Convention, Shape};
+use crate::remaining::Places;
+use crate::{Export, Nothing, Page, Sources, Target, driver};
 
-/// Text of the header.
-///
-/// # Errors
-/// The calibration is missing, or an error of [`Misalignment::of`].
-pub fn export(from: &Sources) -> Result<Export> {
-    let (calibration, place) = from.calibration()?;
-    let mut export = Export::new("fusion", from);
-    let raw_unit = calibration.recording.raw_unit;
-    let mut body = String::new();
-    for sensor in [Sensor::Gyro, Sensor::Accel] {
-        let (name, unit, per_si) = match sensor {
-            Sensor::Gyro => ("gyroscope", "deg/s", 1.0_f64.to_degrees()),
-            Sensor::Accel => ("accelerometer", "g", 1.0 / STANDARD_GRAVITY),
-        };
-        let Some(model) = calibration.inverse(sensor) else {
-            export
-                .notes
-                .push(format!("The {sensor} is not calibrated."));
-            continue;
-        };
-        let raw = Forward::of(&model).ok_or_else(|| {
-            let problem = format!("C of the {sensor} is singular");
-            Error::new(place, problem, "fit the recording again")
-        })?;
-        let factors = Misalignment::of(&model.matrix, sensor)?;
-        export.formulas.push(format!(
-            "{name}: calibrated = misalignment * (sensitivity o (raw - offset)), {raw_unit} to {unit}, o by elements; in the frame of the calibration"
-        ));
-        let numbers = [
-            (
-                "Matrix",
-                "Misalignment",
-                factors.matrix.transpose().as_slice().to_vec(),
-                "1, by rows".into(),
-            ),
-            (
-                "Vector",
-                "Sensitivity",
-                (per_si * factors.sensitivity).as_slice().to_vec(),
-                format!("{unit} per {raw_unit}"),
-            ),
-            (
-                "Vector",
-                "Offset",
-                raw.bias.as_slice().to_vec(),
-                raw_unit.to_string(),
-            ),
-        ];
-        for (kind, what, values, unit) in numbers {
-            let values: Vec<String> = values.iter().map(|v| format!("{:?}f", *v as f32)).collect();
-            let values = values.join(", ");
-            let _ = writeln!(
-                body,
-                "static const Fusion{kind} {name}{what} = {{{{{values}}}}}; // {unit}"
-            );
+/// The format.
+pub struct Fusion;
+
+impl Target for Fusion {
+    type Options = Nothing;
+    const NAME: &str = "fusion";
+    const ABOUT: &str = "Both triads for Fusion of x-io: a header in C";
+    const CONTENTS: &str = "C and o of both triads, in deg/s and g";
+    const READERS: &str = "Fusion of x-io Technologies, in C";
+    const CONVENTION: Convention =
+        Convention::to_input(Shape::MisalignmentSensitivity, Bias::SubtractedFromReadings);
+    const PAGES: &[Page] = &[Page::of("Fusion (x-io)", "fusion.h")];
+
+    /// # Errors
+    /// The calibration is missing, or an error of [`Convention::of`].
+    fn export(from: &Sources, _: &Nothing) -> Result<Export> {
+        let (calibration, place) = from.calibration()?;
+        let mut export = Export::new::<Self>(from);
+        let raw_unit = calibration.recording.raw_unit;
+        let mut body = String::new();
+        for (sensor, name, unit, per_si) in [
+            (Sensor::Gyro, "gyroscope", "deg/s", 1.0_f64.to_degrees()),
+            (Sensor::Accel, "accelerometer", "g", 1.0 / STANDARD_GRAVITY),
+        ] {
+            if calibration.table(sensor).is_none() {
+                export.note(format!("The {sensor} is not calibrated."));
+                continue;
+            }
+            let parts = Self::CONVENTION.of(&driver::raw(calibration, place, sensor)?)?;
+            export.formula(format!(
+                "{name}: calibrated = misalignment * (sensitivity o (raw - offset)), {raw_unit} to {unit}, o by elements; in the frame of the calibration"
+            ));
+            let misalignment = parts.left.transpose();
+            let sensitivity = per_si * parts.right.diagonal();
+            for (kind, what, values, unit) in [
+                (
+                    "Matrix",
+                    "Misalignment",
+                    misalignment.as_slice(),
+                    "1, by rows".into(),
+                ),
+                (
+                    "Vector",
+                    "Sensitivity",
+                    sensitivity.as_slice(),
+                    format!("{unit} per {raw_unit}"),
+                ),
+                (
+                    "Vector",
+                    "Offset",
+                    parts.bias.as_slice(),
+                    raw_unit.to_string(),
+                ),
+            ] {
+                let values: Vec<String> =
+                    values.iter().map(|v| format!("{:?}f", *v as f32)).collect();
+                let values = values.join(", ");
+                let _ = writeln!(
+                    body,
+                    "static const Fusion{kind} {name}{what} = {{{{{values}}}}}; // {unit}"
+                );
+            }
+            body.push('\n');
         }
-        body.push('\n');
+        export.note("FusionModelInertial(raw, misalignment, sensitivity, offset); before version 1.3 FusionCalibrationInertial. 1 g is 9.80665 m/s^2.");
+        export.temperature(calibration);
+        export.leaves(calibration, Places::Matrix);
+        let head = export.head("//", from);
+        Ok(export.with(format!(
+            "{head}\n#ifndef MIMU_FUSION_CALIBRATION_H\n#define MIMU_FUSION_CALIBRATION_H\n\n#include \"Fusion.h\"\n\n{body}#endif\n"
+        )))
     }
-    let note = "FusionModelInertial(raw, misalignment, sensitivity, offset); before version 1.3 FusionCalibrationInertial. 1 g is 9.80665 m/s^2.";
-    export.notes.push(note.into());
-    export.notes.extend(heading::temperature(calibration));
-    let places = Places {
-        cross_terms: true,
-        temperature: false,
-        effects: false,
-    };
-    export.remaining = remaining::of(calibration, places)?;
-    let mut out = heading::comments("//", &heading::of_calibration(calibration, &export));
-    out.push_str("\n#ifndef MIMU_FUSION_CALIBRATION_H\n#define MIMU_FUSION_CALIBRATION_H\n\n#include \"Fusion.h\"\n\n");
-    out.push_str(&body);
-    out.push_str("#endif\n");
-    export.content = out.into_bytes();
-    Ok(export)
 }

@@ -16,12 +16,9 @@ use mimu::quantity::{AXES, PerSensor, Sensor};
 use mimu::readable::STANDARD_GRAVITY;
 use mimu_recording::error::{Argument, Result};
 
-use crate::one_temperature::within;
+use crate::convention::{Bias, Convention, Shape, within};
 use crate::remaining::{self, Places, Remaining};
-use crate::{Export, Sources, driver, heading};
-
-/// Options of the script.
-pub type Options = driver::Options;
+use crate::{Export, Page, Sources, Target, driver};
 
 /// One step of the registers, SI.
 const STEP: PerSensor<f64> = PerSensor {
@@ -48,70 +45,66 @@ find_device() {
 }
 "#;
 
-/// Text of the script.
-///
-/// # Errors
-/// The calibration is missing, C is singular, or a bias is beyond the range of the chip.
-pub fn export(from: &Sources, options: &Options) -> Result<Export> {
-    let (calibration, place) = from.calibration()?;
-    let mut export = Export::new("iio", from);
-    export.formulas.push(
-        "output = scale * raw + calibbias on each axis of the chip, SI; the chip adds calibbias"
-            .into(),
-    );
-    let places = Places {
-        cross_terms: false,
-        temperature: false,
-        effects: false,
-    };
-    export.remaining = remaining::of(calibration, places)?;
-    let mut body = String::new();
-    for sensor in Sensor::BOTH {
-        if calibration.table(sensor).is_none() {
-            export.notes.push(format!(
-                "The calibration has no {sensor}, so its calibbias stays as it is."
-            ));
-            continue;
+/// The format.
+pub struct Iio;
+
+impl Target for Iio {
+    type Options = driver::Options;
+    const NAME: &str = "iio";
+    const ABOUT: &str =
+        "Biases for the Linux driver inv_icm42600: a script that writes calibbias of IIO";
+    const CONTENTS: &str = "biases";
+    const READERS: &str = "Linux, driver inv_icm42600";
+    const CONVENTION: Convention = Convention::to_input(Shape::Absent, Bias::AddedToReadings);
+    const PAGES: &[Page] = &[Page::of("Linux IIO, inv_icm42600", "calibbias.sh")];
+
+    /// # Errors
+    /// The calibration is missing, C is singular, or a bias is beyond the range of the chip.
+    fn export(from: &Sources, options: &driver::Options) -> Result<Export> {
+        let (calibration, place) = from.calibration()?;
+        let mut export = Export::new::<Self>(from);
+        export.formula("output = scale * raw + calibbias on each axis of the chip, SI; the chip adds calibbias");
+        export.leaves(calibration, Places::Axes);
+        let mut body = String::new();
+        for (sensor, suffix, channel, argument) in [
+            (Sensor::Gyro, "gyro", "anglvel", Argument::GyroZero),
+            (Sensor::Accel, "accel", "accel", Argument::AccelZero),
+        ] {
+            if calibration.table(sensor).is_none() {
+                export.note(format!(
+                    "The calibration has no {sensor}, so its calibbias stays as it is."
+                ));
+                continue;
+            }
+            let readings = options.readings(calibration, place, sensor)?;
+            export.note(readings.line());
+            let gain = readings.forward.matrix.diagonal();
+            export
+                .remaining
+                .push(remaining::scale_factors(sensor, &gain));
+            export
+                .remaining
+                .push(Remaining::of_rounding(sensor, STEP[sensor]));
+            let _ = writeln!(body, "find_device \"${{1:-i[ci]m4*}}-{suffix}\"");
+            let bias = Self::CONVENTION.of(&readings)?.bias;
+            for (i, axis) in AXES.iter().enumerate() {
+                let name = format!("in_{channel}_{axis}_calibbias");
+                let (most, unit) = (MOST * STEP[sensor], format!(" {}", sensor.unit()));
+                let remedy = ("give the zero of the readings", argument);
+                within(
+                    (sensor, i),
+                    &name,
+                    (bias[i], 3, &unit),
+                    [-most, most],
+                    remedy,
+                )?;
+                let _ = writeln!(body, "echo {:.9} > \"$found/{name}\"", bias[i]);
+            }
         }
-        let readings = options.readings(calibration, place, sensor)?;
-        export.notes.push(readings.line());
-        export.remaining.push(remaining::scale_factors(
-            sensor,
-            &readings.forward.matrix.diagonal(),
-        ));
-        export
-            .remaining
-            .push(Remaining::of_rounding(sensor, STEP[sensor]));
-        let (suffix, channel, argument) = match sensor {
-            Sensor::Gyro => ("gyro", "anglvel", Argument::GyroZero),
-            Sensor::Accel => ("accel", "accel", Argument::AccelZero),
-        };
-        let _ = writeln!(body, "find_device \"${{1:-i[ci]m4*}}-{suffix}\"");
-        for (i, axis) in AXES.iter().enumerate() {
-            let name = format!("in_{channel}_{axis}_calibbias");
-            let most = MOST * STEP[sensor];
-            let unit = format!(" {}", sensor.unit());
-            let value = -readings.forward.bias[i];
-            within(
-                sensor,
-                i,
-                (&name, value, &unit),
-                [-most, most],
-                ("give the zero of the readings", argument),
-            )?;
-            let _ = writeln!(body, "echo {value:.9} > \"$found/{name}\"");
-        }
+        export.temperature(calibration);
+        export.note("For the driver inv_icm42600. Record with calibbias 0, as after power-on, and in the axes of the chip: before mount_matrix.");
+        export.note("Run it as root with the name of the chip, such as icm42688, if there are several; from a udev rule of the devices to have it at every start.");
+        let head = export.head("#", from);
+        Ok(export.with(format!("#!/bin/sh\n{head}{FIND}{body}")))
     }
-    export.notes.extend(heading::temperature(calibration));
-    export.notes.push("For the driver inv_icm42600. Record with calibbias 0, as after power-on, and in the axes of the chip: before mount_matrix.".into());
-    export.notes.push("Run it as root with the name of the chip, such as icm42688, if there are several; from a udev rule of the devices to have it at every start.".into());
-    let mut out = "#!/bin/sh\n".to_owned();
-    out.push_str(&heading::comments(
-        "#",
-        &heading::of_calibration(calibration, &export),
-    ));
-    out.push_str(FIND);
-    out.push_str(&body);
-    export.content = out.into_bytes();
-    Ok(export)
 }

@@ -7,47 +7,44 @@
 use mimu::quantity::Sensor;
 use mimu_recording::error::Result;
 
-use crate::remaining::{self, Places, Remaining};
-use crate::{Export, Sources, driver, heading, yaml};
+use crate::convention::{Bias, Convention, Shape};
+use crate::remaining::{Places, Remaining};
+use crate::{Export, Page, Sources, Target, driver, yaml};
 
-/// Options of the file.
-pub type Options = driver::Options;
+/// The format.
+pub struct ImuCalib;
 
-/// Text of `imu_calib.yaml`.
-///
-/// # Errors
-/// No accelerometer is calibrated, or C is singular.
-pub fn export(from: &Sources, options: &Options) -> Result<Export> {
-    let (calibration, place) = from.calibration()?;
-    let readings = options.readings(calibration, place, Sensor::Accel)?;
-    let mut export = Export::new("imu-calib", from);
-    export.formulas.push(
-        "accel: output = SM reading - bias, m/s^2 to m/s^2; SM by rows, output in the frame of the calibration"
-            .into(),
-    );
-    export.notes.push(readings.line());
-    export.notes.extend(heading::temperature(calibration));
-    let places = Places {
-        cross_terms: true,
-        temperature: false,
-        effects: false,
-    };
-    export.remaining = remaining::of(calibration, places)?;
-    export.remaining.retain(|r| r.sensor == Sensor::Accel);
-    if calibration.gyro.is_some() {
-        let gyro = options.readings(calibration, place, Sensor::Gyro)?;
-        export.notes.push("gyro: imu_calib only subtracts the mean of the first messages. Keep the unit still during them.".into());
-        export.notes.push(gyro.line());
-        export
-            .remaining
-            .push(Remaining::of_readings(Sensor::Gyro, &gyro.forward.matrix));
+impl Target for ImuCalib {
+    type Options = driver::Options;
+    const NAME: &str = "imu-calib";
+    const ABOUT: &str = "Accelerometer for the ROS package imu_calib: imu_calib.yaml";
+    const CONTENTS: &str = "C and o of the accelerometer";
+    const READERS: &str = "the ROS package imu_calib";
+    const CONVENTION: Convention = Convention::to_input(Shape::Whole, Bias::SubtractedFromInput);
+    const PAGES: &[Page] = &[Page::of("ROS imu_calib", "imu_calib.yaml")];
+
+    /// # Errors
+    /// No accelerometer is calibrated, or C is singular.
+    fn export(from: &Sources, options: &driver::Options) -> Result<Export> {
+        let (calibration, place) = from.calibration()?;
+        let readings = options.readings(calibration, place, Sensor::Accel)?;
+        let mut export = Export::new::<Self>(from);
+        export.formula("accel: output = SM reading - bias, m/s^2 to m/s^2; SM by rows, output in the frame of the calibration");
+        export.note(readings.line());
+        export.temperature(calibration);
+        export.leaves(calibration, Places::Matrix);
+        export.remaining.retain(|r| r.sensor == Sensor::Accel);
+        if calibration.gyro.is_some() {
+            let gyro = options.readings(calibration, place, Sensor::Gyro)?;
+            export.note("gyro: imu_calib only subtracts the mean of the first messages. Keep the unit still during them.");
+            export.note(gyro.line());
+            let error = Remaining::of_readings(Sensor::Gyro, &gyro.forward.matrix);
+            export.remaining.push(error);
+        }
+        let mut out = export.head("#", from);
+        let parts = Self::CONVENTION.of(&readings)?;
+        yaml::list(&mut out, "", "SM", parts.left.transpose().iter().copied());
+        yaml::list(&mut out, "", "bias", parts.bias.iter().copied());
+        Ok(export.with(out))
     }
-    let comments = heading::of_calibration(calibration, &export);
-    let mut out = heading::comments("#", &comments);
-    let matrix = readings.inverse.matrix.transpose();
-    yaml::list(&mut out, "", "SM", matrix.iter().copied());
-    let bias = -readings.inverse.offset;
-    yaml::list(&mut out, "", "bias", bias.iter().copied());
-    export.content = out.into_bytes();
-    Ok(export)
 }

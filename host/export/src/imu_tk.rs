@@ -6,18 +6,16 @@
 
 use std::fmt::Write as _;
 
+use clap::{Args, ValueEnum};
 use mimu::quantity::Sensor;
-use mimu::triad::Forward;
-use mimu_recording::error::{Error, Result};
-use nalgebra::Matrix3;
+use mimu_recording::error::Result;
 
-use crate::misalignment::Misalignment;
-use crate::remaining::{self, Places};
-use crate::{Export, Sources, heading};
+use crate::convention::{Bias, Convention, Shape};
+use crate::remaining::Places;
+use crate::{Export, Page, Sources, Target, driver};
 
 /// The triad that the option names.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Triad {
     /// Gyro
     Gyro,
@@ -26,63 +24,65 @@ pub enum Triad {
 }
 
 /// Options of the file.
-#[derive(Debug, Clone)]
-#[cfg_attr(feature = "clap", derive(clap::Args))]
+#[derive(Debug, Clone, Args)]
 pub struct Options {
     /// Which triad: the program has a file for each
-    #[cfg_attr(feature = "clap", arg(long, value_enum))]
+    #[arg(long, value_enum)]
     pub sensor: Triad,
 }
 
-/// Text of the file.
-///
-/// # Errors
-/// The triad is not calibrated, or an error of [`Misalignment::of`].
-pub fn export(from: &Sources, options: &Options) -> Result<Export> {
-    let (calibration, place) = from.calibration()?;
-    let sensor = match options.sensor {
-        Triad::Gyro => Sensor::Gyro,
-        Triad::Accel => Sensor::Accel,
-    };
-    let model = calibration.inverse(sensor).ok_or_else(|| {
-        let problem = format!("the {sensor} is not calibrated");
-        Error::new(place, problem, "fit a recording that determines it")
-    })?;
-    let raw = Forward::of(&model).ok_or_else(|| {
-        Error::new(
-            place,
-            format!("C of the {sensor} is singular"),
-            "fit the recording again",
-        )
-    })?;
-    let factors = Misalignment::of(&model.matrix, sensor)?;
-    let mut export = Export::new("imu-tk", from);
-    export.formulas.push(format!(
-        "{sensor}: output = T K (raw - B), {} to {}; above T and K by rows, then B",
-        calibration.recording.raw_unit,
-        sensor.unit()
-    ));
-    export.notes.extend(heading::temperature(calibration));
-    let places = Places {
-        cross_terms: true,
-        temperature: false,
-        effects: false,
-    };
-    export.remaining = remaining::of(calibration, places)?;
-    export.remaining.retain(|r| r.sensor == sensor);
-    let mut out = String::new();
-    for matrix in [factors.matrix, Matrix3::from_diagonal(&factors.sensitivity)] {
-        for row in matrix.row_iter() {
-            let _ = writeln!(out, "{:.12e} {:.12e} {:.12e}", row[0], row[1], row[2]);
+/// The format.
+pub struct ImuTk;
+
+impl Target for ImuTk {
+    type Options = Options;
+    const NAME: &str = "imu-tk";
+    const ABOUT: &str = "One triad for IMU-TK: acc.calib or gyro.calib";
+    const CONTENTS: &str = "C and o of one triad (`--sensor gyro` or `accel`)";
+    const READERS: &str = "IMU-TK";
+    const CONVENTION: Convention =
+        Convention::to_input(Shape::MisalignmentSensitivity, Bias::SubtractedFromReadings);
+    const PAGES: &[Page] = &[
+        Page {
+            options: "--sensor accel",
+            ..Page::of("IMU-TK, accelerometer", "acc.calib")
+        },
+        Page {
+            options: "--sensor gyro",
+            ..Page::of("IMU-TK, gyro", "gyro.calib")
+        },
+    ];
+
+    /// # Errors
+    /// The triad is not calibrated, or an error of [`Convention::of`].
+    fn export(from: &Sources, options: &Options) -> Result<Export> {
+        let (calibration, place) = from.calibration()?;
+        let sensor = match options.sensor {
+            Triad::Gyro => Sensor::Gyro,
+            Triad::Accel => Sensor::Accel,
+        };
+        let parts = Self::CONVENTION.of(&driver::raw(calibration, place, sensor)?)?;
+        let mut export = Export::new::<Self>(from);
+        export.formula(format!(
+            "{sensor}: output = T K (raw - B), {} to {}; above T and K by rows, then B",
+            calibration.recording.raw_unit,
+            sensor.unit()
+        ));
+        export.temperature(calibration);
+        export.leaves(calibration, Places::Matrix);
+        export.remaining.retain(|r| r.sensor == sensor);
+        let mut out = String::new();
+        for matrix in [parts.left, parts.right] {
+            for row in matrix.row_iter() {
+                let _ = writeln!(out, "{:.12e} {:.12e} {:.12e}", row[0], row[1], row[2]);
+            }
+            out.push('\n');
+        }
+        for value in parts.bias.iter() {
+            let _ = writeln!(out, "{value:.12e}");
         }
         out.push('\n');
+        out += &export.head("#", from);
+        Ok(export.with(out))
     }
-    for value in raw.bias.iter() {
-        let _ = writeln!(out, "{value:.12e}");
-    }
-    out.push('\n');
-    let comments = heading::of_calibration(calibration, &export);
-    out.push_str(&heading::comments("#", &comments));
-    export.content = out.into_bytes();
-    Ok(export)
 }

@@ -8,8 +8,8 @@ use mimu_recording::error::{Error, Result};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::remaining::{self, Places, Remaining};
-use crate::{Export, Sources, heading};
+use crate::remaining::{Places, Remaining};
+use crate::{Export, Nothing, Page, Sources, Target, heading};
 
 /// The file.
 #[derive(Serialize, JsonSchema)]
@@ -25,37 +25,39 @@ struct CalibrationJson<'a> {
     remaining: Vec<Remaining>,
 }
 
-/// Text of the file.
-///
-/// # Errors
-/// The calibration is missing, or this build cannot evaluate an effect.
-pub fn export(from: &Sources) -> Result<Export> {
-    let (calibration, place) = from.calibration()?;
-    let mut export = Export::new("json", from);
-    export
-        .formulas
-        .push("x = C u + o, raw to SI, and u = P x + b, SI to raw; C and P by rows.".into());
-    if calibration.temperature.is_some() {
-        export.formulas.push("Over temperature a number p and its slope s are (1+2w)(1-w)^2 p0 + w^2(3-2w) p1 + h w(1-w)^2 s0 - h w^2(1-w) s1 between two nodes, h apart, w from 0 to 1.".into());
+/// The format.
+pub struct Json;
+
+impl Target for Json {
+    type Options = Nothing;
+    const NAME: &str = "json";
+    const ABOUT: &str = "JSON with the contents of the calibration file, and a schema";
+    const CONTENTS: &str = "everything, with the uncertainty";
+    const READERS: &str = "any program; [its schema](calibration.schema.json)";
+    const PAGES: &[Page] = &[Page::of("JSON", "calibration.json")];
+
+    /// # Errors
+    /// The calibration is missing.
+    fn export(from: &Sources, _: &Nothing) -> Result<Export> {
+        let (calibration, place) = from.calibration()?;
+        let mut export = Export::new::<Self>(from);
+        export.formula("x = C u + o, raw to SI, and u = P x + b, SI to raw; C and P by rows.");
+        if calibration.temperature.is_some() {
+            export.formula("Over temperature a number p and its slope s are (1+2w)(1-w)^2 p0 + w^2(3-2w) p1 + h w(1-w)^2 s0 - h w^2(1-w) s1 between two nodes, h apart, w from 0 to 1.");
+        }
+        export.leaves(calibration, Places::Effects);
+        let file = CalibrationJson {
+            about: heading::of(&export, from),
+            calibration,
+            calibration_errors: export.calibration_errors.clone(),
+            remaining: export.remaining.clone(),
+        };
+        let text = serde_json::to_string_pretty(&file).map_err(|e| {
+            let problem = format!("it cannot be written as JSON: {e}");
+            Error::new(place, problem, "fit the recording again")
+        })?;
+        Ok(export.with(text + "\n"))
     }
-    let places = Places {
-        cross_terms: true,
-        temperature: true,
-        effects: true,
-    };
-    export.remaining = remaining::of(calibration, places)?;
-    let file = CalibrationJson {
-        about: heading::of_calibration(calibration, &export),
-        calibration,
-        calibration_errors: export.calibration_errors.clone(),
-        remaining: export.remaining.clone(),
-    };
-    let text = serde_json::to_string_pretty(&file).map_err(|e| {
-        let problem = format!("it cannot be written as JSON: {e}");
-        Error::new(place, problem, "fit the recording again")
-    })?;
-    export.content = (text + "\n").into_bytes();
-    Ok(export)
 }
 
 /// The schema of the file, as text: `docs/calibration.schema.json`.

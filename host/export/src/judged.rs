@@ -21,21 +21,14 @@ pub struct JudgedSource {
 impl JudgedSource {
     /// Those of all sources.
     pub fn all(from: &Sources) -> Vec<Self> {
-        let calibration = from.calibration.map(|(c, _)| ("calibration", &c.judgement));
-        let noise = from.noise.map(|n| ("noise", &n.judgement));
-        let mut all: Vec<Self> = [calibration, noise]
-            .into_iter()
-            .flatten()
-            .map(|(source, judgement)| Self {
-                source,
-                judgement: judgement.clone(),
-            })
-            .collect();
-        all.extend(from.biases.map(|b| Self {
-            source: "biases",
-            judgement: Some(b.judgement.clone()),
-        }));
-        all
+        let calibration = from
+            .calibration
+            .map(|(c, _)| ("calibration", c.judgement.clone()));
+        let noise = from.noise.map(|n| ("noise", n.judgement.clone()));
+        let biases = from.biases.map(|b| ("biases", Some(b.judgement.clone())));
+        let all = [calibration, noise, biases].into_iter().flatten();
+        let of = |(source, judgement)| Self { source, judgement };
+        all.map(of).collect()
     }
 
     /// Whether it is judged good.
@@ -45,13 +38,9 @@ impl JudgedSource {
 
     /// One line for comments and the terminal.
     pub fn line(&self) -> String {
-        match &self.judgement {
-            Some(judgement) => format!("judgement of the {}: {judgement}", self.source),
-            None => format!(
-                "judgement of the {}: none, its file does not contain one",
-                self.source
-            ),
-        }
+        let judgement = self.judgement.as_ref().map(Judgement::to_string);
+        let judgement = judgement.unwrap_or("none, its file does not contain one".into());
+        format!("judgement of the {}: {judgement}", self.source)
     }
 }
 
@@ -62,18 +51,11 @@ fn error(sensor: Sensor, table: &TriadTable) -> Option<Remaining> {
         Some(rms) => ("error of unseen data", rms),
         None => ("error in sample, as nothing was held out", judged.rms),
     };
-    Some(Remaining {
-        sensor,
-        source: source.into(),
-        condition: judged.figure.clone(),
-        unit: if judged.unit == "rad" {
-            "rad"
-        } else {
-            sensor.unit()
-        },
-        rms: Some(rms),
-        max: None,
-    })
+    let mut error = Remaining::of(sensor, source, judged.figure.clone(), Some(rms), None);
+    if judged.unit == "rad" {
+        error.unit = "rad";
+    }
+    Some(error)
 }
 
 /// The errors of `calibration` itself.
@@ -85,12 +67,11 @@ pub fn errors_of(calibration: &Calibration) -> Vec<Remaining> {
 /// The error of curves at rest: `rms` raw, in the unit of `cubics`.
 pub fn error_of_curves(cubics: &BiasCubics, rms: f64) -> Remaining {
     let factors = cubics.conversion.si_per_raw.map(f64::abs);
+    let rms = Some(rms * factors.iter().sum::<f64>() / 3.0);
+    let condition = "readings at rest minus the curves";
+    let error = Remaining::of(cubics.sensor, "error of unseen data", condition, rms, None);
     Remaining {
-        sensor: cubics.sensor,
-        source: "error of unseen data".into(),
-        condition: "readings at rest minus the curves".into(),
         unit: cubics.unit,
-        rms: Some(rms * factors.iter().sum::<f64>() / 3.0),
-        max: None,
+        ..error
     }
 }

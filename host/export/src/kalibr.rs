@@ -17,105 +17,84 @@
 
 use std::fmt::Write as _;
 
+use clap::Args;
 use mimu::quantity::{PerSensor, Sensor};
+use mimu_allan::model::Term;
 use mimu_recording::error::Result;
 use nalgebra::{Matrix3, Matrix4};
 
-use crate::intrinsics::{Intrinsics, Triangle};
-use crate::worst_axis::{Densities, NoiseOptions, line};
-use crate::{Export, Sources, driver, heading, yaml};
+use crate::convention::{Bias, Convention, Shape, Triangle};
+use crate::intrinsics::Intrinsics;
+use crate::worst_axis::{Key, NoiseOptions, lines};
+use crate::{Export, Noise, Page, Sources, Target, driver, yaml};
 
 /// Options of Kalibr's file.
-#[derive(Debug, Clone)]
-#[cfg_attr(feature = "clap", derive(clap::Args))]
+#[derive(Debug, Clone, Args)]
 pub struct Options {
     /// Topic of Kalibr's messages
-    #[cfg_attr(
-        feature = "clap",
-        arg(long, value_name = "TOPIC", default_value = "/imu0")
-    )]
+    #[arg(long, value_name = "TOPIC", default_value = "/imu0")]
     pub rostopic: String,
     /// Layout of Kalibr's result (below imu0), for programs that read this layout
-    #[cfg_attr(feature = "clap", arg(long))]
+    #[arg(long)]
     pub result: bool,
     /// Options common to all noise files.
-    #[cfg_attr(feature = "clap", command(flatten))]
+    #[command(flatten)]
     pub noise: NoiseOptions,
     /// The driver's conversion.
-    #[cfg_attr(feature = "clap", command(flatten))]
+    #[command(flatten)]
     pub driver: driver::Options,
 }
 
-/// Text of `imu.yaml`.
-///
-/// # Errors
-/// The noise is missing, or an error of [`crate::worst_axis::WalkOptions::densities`] or [`Intrinsics::of`].
-pub fn export(from: &Sources, options: &Options) -> Result<Export> {
-    let noise = from.noise()?;
-    let mut export = Export::new("kalibr", from);
-    export.notes.extend(from.other_device());
-    export.formulas.push(format!(
-        "Continuous-time densities of the worst axis; {} % interval behind each.",
-        100.0 * noise.confidence
-    ));
-    let intrinsics = match from.calibration {
-        Some((calibration, place)) => {
-            let half = Triangle::Lower;
-            Some((
-                calibration,
-                Intrinsics::of(calibration, place, &options.driver, half)?,
-            ))
-        }
-        None => {
-            options.driver.unused()?;
-            None
-        }
-    };
-    let gain = match &intrinsics {
-        Some((_, known)) => known.readings.as_ref().map(driver::Readings::noise_gain),
-        None => PerSensor::both([1.0; 3]),
-    };
-    let densities = options.noise.walks.densities(noise, &gain)?;
-    let indent = if options.result { "  " } else { "" };
-    let mut body = String::new();
-    if options.result {
-        body.push_str("imu0:\n");
-    }
-    write_densities(&mut body, indent, &densities);
-    let rate = options.noise.rate_hz(noise);
-    let topic = serde_json::Value::from(options.rostopic.as_str());
-    let _ = writeln!(
-        body,
-        "\n{indent}rostopic: {topic}\n{indent}update_rate: {rate:.3}  # Hz"
-    );
-    let comments = match intrinsics {
-        None => heading::of_noise(noise, &export),
-        Some((calibration, known)) => {
+/// The format.
+pub struct Kalibr;
+
+impl Target for Kalibr {
+    type Options = Options;
+    const NAME: &str = "kalibr";
+    const ABOUT: &str = "Noise and intrinsics for Kalibr: imu.yaml";
+    const CONTENTS: &str = "noise; with `--calibration` also the scale-misalignment intrinsics";
+    const READERS: &str = "Kalibr; programs that read Kalibr's result";
+    const CONVENTION: Convention =
+        Convention::to_reading(Shape::TriangleRotation(Triangle::Lower), Bias::Absent);
+    const NOISE: Noise = Noise::Needed;
+    const PAGES: &[Page] = &[Page::of("Kalibr", "imu.yaml")];
+
+    /// # Errors
+    /// The noise is missing, or an error of [`crate::worst_axis::WalkOptions::densities`] or [`Intrinsics::of`].
+    fn export(from: &Sources, options: &Options) -> Result<Export> {
+        let noise = from.noise()?;
+        let mut export = Export::new::<Self>(from);
+        export.continuous_densities(noise);
+        let known = Intrinsics::of(from, &options.driver, Triangle::Lower, &mut export)?;
+        let densities = options.noise.walks.densities(noise, &known.gain)?;
+        let (mut body, indent) = match options.result {
+            true => ("imu0:\n".to_owned(), "  "),
+            false => (String::new(), ""),
+        };
+        body += &lines(indent, &KEYS, &densities, |density| density);
+        let rate = options.noise.rate_hz(noise);
+        let topic = serde_json::Value::from(options.rostopic.as_str());
+        let _ = writeln!(
+            body,
+            "\n{indent}rostopic: {topic}\n{indent}update_rate: {rate:.3}  # Hz"
+        );
+        if from.calibration.is_some() {
             write_intrinsics(&mut body, indent, &known, &mut export);
-            known.describe(calibration, &mut export);
-            let mut comments = heading::of_calibration(calibration, &export);
-            comments.insert(2, heading::noise_from(noise));
-            comments
+            known.describe(from, &mut export);
         }
-    };
-    export.content = (heading::comments("#", &comments) + &body).into_bytes();
-    Ok(export)
+        let head = export.head("#", from);
+        Ok(export.with(head + &body))
+    }
 }
 
-/// The four noise keys that Kalibr and OpenVINS share.
-pub fn write_densities(out: &mut String, indent: &str, densities: &PerSensor<Densities>) {
-    for sensor in [Sensor::Accel, Sensor::Gyro] {
-        let (prefix, units) = match sensor {
-            Sensor::Accel => ("accelerometer", ["m/s^2/sqrt(Hz)", "m/s^3/sqrt(Hz)"]),
-            Sensor::Gyro => ("gyroscope", ["rad/s/sqrt(Hz)", "rad/s^2/sqrt(Hz)"]),
-        };
-        let Densities { white, walk } = &densities[sensor];
-        let key = format!("{prefix}_noise_density");
-        out.push_str(&line(indent, &key, |density| density, units[0], white));
-        let key = format!("{prefix}_random_walk");
-        out.push_str(&line(indent, &key, |density| density, units[1], walk));
-    }
-}
+/// The noise keys that Kalibr and OpenVINS share.
+#[rustfmt::skip]
+pub(crate) const KEYS: [Key; 4] = [
+    ("accelerometer_noise_density", "m/s^2/sqrt(Hz)", Sensor::Accel, Term::N),
+    ("accelerometer_random_walk", "m/s^3/sqrt(Hz)", Sensor::Accel, Term::K),
+    ("gyroscope_noise_density", "rad/s/sqrt(Hz)", Sensor::Gyro, Term::N),
+    ("gyroscope_random_walk", "rad/s^2/sqrt(Hz)", Sensor::Gyro, Term::K),
+];
 
 fn write_intrinsics(out: &mut String, indent: &str, known: &Intrinsics, export: &mut Export) {
     let PerSensor { gyro, accel } = known.factors;
@@ -133,16 +112,15 @@ fn write_intrinsics(out: &mut String, indent: &str, known: &Intrinsics, export: 
     yaml::matrix(out, &inner, "C_gyro_i", &between);
     yaml::matrix(out, indent, "T_i_b", &Matrix4::identity());
     let _ = writeln!(out, "{indent}time_offset: 0.0");
-    let models = [
+    export.formula(
         "Intrinsics, SI to the program's readings in SI, a and w in the frame i of the accelerometer:",
-        "  accelerometer = M a + bias,  gyroscope = M C_gyro_i w + A C_gyro_i a + bias",
-    ];
-    export.formulas.extend(models.map(String::from));
-    export.formulas.push(format!(
+    );
+    export.formula("  accelerometer = M a + bias,  gyroscope = M C_gyro_i w + A C_gyro_i a + bias");
+    export.formula(format!(
         "  x_i = R x_body, body the frame of the calibration, R = {}",
         rows(&accel.rotation)
     ));
-    export.notes.push("Kalibr estimates the intrinsics itself (--imu-models scale-misalignment) and does not start from these. They serve for comparison, and for programs that read Kalibr's result.".into());
+    export.note("Kalibr estimates the intrinsics itself (--imu-models scale-misalignment) and does not start from these. They serve for comparison, and for programs that read Kalibr's result.");
 }
 
 /// A matrix in one line.

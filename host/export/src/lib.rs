@@ -1,35 +1,40 @@
 //! Calibrations and noise in the formats of other programs.
 //!
-//! Each format has a file with its options, its formula and its source. To add a format, write its file and add its variant to [`Format`].
+//! Each format is one file: what it [declares](Format) (name, help, convention, row of the documentation), its options, its formula and its source. To
+//! add one, write its file and name it twice here.
 //!
 //! | module | contents |
 //! |---|---|
 //! | [`kalibr`], [`openvins`], [`px4`], [`core`] ... | one format each |
-//! | [`worst_axis`] | noise for programs that have one number for three axes |
+//! | [`format`](mod@format) | what a format declares, and the subcommands |
+//! | [`convention`] | how programs write the model of a triad: direction, factors, sign and place of the bias |
 //! | [`driver`] | readings in SI, as converted by a driver |
-//! | [`misalignment`] | misalignment times sensitivity, for IMU-TK and Fusion |
+//! | [`worst_axis`] | noise for programs that have one number for three axes |
 //! | [`intrinsics`] | triangular matrices and rotations, for Kalibr and OpenVINS |
 //! | [`remaining`] | errors that remain because a format cannot store a part of the calibration |
 //! | [`judged`] | judgements of the sources, and errors that every program inherits |
-//! | [`heading`] | the comments at the head of every file |
+//! | `heading` | the comments at the head of every file |
 //! | [`parameters`] | parameters of autopilots, and their file layouts |
 //! | `degrees_per_turn` | scale factors of a gyro alone, for SlimeNRF and the Pigeon 2 |
 //! | `flight_codes` | the accelerometer in whole codes, for Betaflight and INAV |
+//! | `template` | fixed text with places for values |
 
 pub mod ardupilot;
 pub mod autoware;
 pub mod basalt;
 pub mod betaflight;
 pub mod c;
+pub mod convention;
 pub mod core;
 mod degrees_per_turn;
 pub mod depthai;
 pub mod driver;
 pub mod fastlio;
 mod flight_codes;
+pub mod format;
 pub mod fusion;
 pub mod gazebo;
-pub mod heading;
+mod heading;
 pub mod iio;
 pub mod imu_calib;
 pub mod imu_tk;
@@ -40,11 +45,7 @@ pub mod judged;
 pub mod kalibr;
 pub mod liosam;
 pub mod matlab;
-pub mod misalignment;
-mod one_temperature;
 pub mod openvins;
-#[cfg(feature = "clap")]
-mod options;
 pub mod orbslam3;
 pub mod parameters;
 pub mod pigeon;
@@ -54,106 +55,53 @@ pub mod remaining;
 pub mod ros_imu;
 pub mod rust;
 pub mod slimenrf;
+mod sources;
+mod template;
 pub mod vins;
 pub mod worst_axis;
 pub mod yaml;
 
 use mimu::calibration::Calibration;
 use mimu::calibration::bias_cubic::BiasCubics;
-use mimu::calibration::thermal_biases::ThermalBiases;
-use mimu::noise::noise_file::{NoiseChannel, NoiseFile};
-use mimu::quantity::{Sensor, significant};
-use mimu_recording::error::{Argument, Error, Result};
-use mimu_recording::{RAW_COLUMNS, RawUnit};
+use mimu::noise::noise_file::NoiseFile;
 use serde::Serialize;
 
+pub use crate::format::{Choice, Format, Noise, Nothing, Page, Target};
 use crate::judged::JudgedSource;
 use crate::parameters::Parameter;
-use crate::remaining::Remaining;
+use crate::remaining::{Places, Remaining};
+pub use crate::sources::Sources;
 
-/// A format with its options.
-#[derive(Debug, Clone)]
-#[cfg_attr(feature = "clap", derive(clap::Subcommand))]
-pub enum Format {
-    /// A C99 header: constants, and functions that convert raw readings to SI
-    C(c::Options),
-    /// Constants and a function for Rust programs with mimu-core
-    Rust,
-    /// JSON with the contents of the calibration file, and a schema
-    Json,
-    /// Noise and intrinsics for Kalibr: imu.yaml
-    Kalibr(kalibr::Options),
-    /// Noise and intrinsics for OpenVINS: kalibr_imu_chain.yaml
-    #[cfg_attr(feature = "clap", command(name = "openvins"))]
-    OpenVins(openvins::Options),
-    /// Noise for VINS-Fusion and VINS-Mono
-    Vins(vins::Options),
-    /// Noise for ORB-SLAM3
-    #[cfg_attr(feature = "clap", command(name = "orbslam3"))]
-    OrbSlam3(orbslam3::Options),
-    /// Noise for LIO-SAM
-    #[cfg_attr(feature = "clap", command(name = "liosam"))]
-    LioSam(liosam::Options),
-    /// Noise for FAST-LIO
-    #[cfg_attr(feature = "clap", command(name = "fastlio"))]
-    FastLio(fastlio::Options),
-    /// Accelerometer for the ROS package imu_calib: imu_calib.yaml
-    ImuCalib(imu_calib::Options),
-    /// One triad for IMU-TK: acc.calib or gyro.calib
-    ImuTk(imu_tk::Options),
-    /// Both triads for Fusion of x-io: a header in C
-    Fusion,
-    /// Both triads for a RealSense camera: bytes of its EEPROM, or calibration.json
-    #[cfg_attr(feature = "clap", command(name = "realsense"))]
-    RealSense(realsense::Options),
-    /// Both triads and noise for an OAK camera: imuCalibrationParams of DepthAI
-    #[cfg_attr(feature = "clap", command(name = "depthai"))]
-    DepthAi(depthai::Options),
-    /// Both triads and noise for Basalt: the inertial part of its calibration
-    Basalt(basalt::Options),
-    /// Parameters of PX4: TC_* over temperature, CAL_* at one
-    Px4(px4::Options),
-    /// Parameters of ArduPilot: INS_TCAL* over temperature, INS_ACCOFFS, INS_ACCSCAL and INS_GYROFFS at one
-    #[cfg_attr(feature = "clap", command(name = "ardupilot"))]
-    ArduPilot(ardupilot::Options),
-    /// Biases of the accelerometer for Betaflight: lines of its CLI
-    Betaflight(betaflight::Options),
-    /// Biases and scale factors of the accelerometer for INAV: lines of its CLI
-    Inav(inav::Options),
-    /// Scale factors of the gyro for a SlimeVR tracker with SlimeNRF: the line `sens x,y,z` of its console
-    #[cfg_attr(feature = "clap", command(name = "slimenrf"))]
-    SlimeNrf(slimenrf::Options),
-    /// Scale factors of the gyro for a Pigeon 2 of CTR Electronics: GyroScalarX, Y and Z in degrees per rotation
-    Pigeon(pigeon::Options),
-    /// Biases for the Linux driver inv_icm42600: a script that writes calibbias of IIO
-    Iio(iio::Options),
-    /// Covariances of sensor_msgs/Imu for ROS
-    RosImu(ros_imu::Options),
-    /// Biases of the gyro and noise for Autoware: imu_corrector.param.yaml
-    Autoware(autoware::Options),
-    /// Biases and noise for Gazebo: the element imu of SDF
-    Gazebo(gazebo::Options),
-    /// Errors and noise for MATLAB's imuSensor: JSON for loadparams
-    Matlab(matlab::Options),
-    /// The bytes that a device stores, for programs with mimu-core
-    Core,
-}
-
-/// Largest share by which a scale factor may differ from 1 without a consequence: that of N is rarely known better.
-const SAME_SCALE: f64 = 0.03;
-/// Largest share by which two scale factors of one unit differ: temperature and age change it by less.
-const OTHER_SCALE: f64 = 0.1;
-
-/// Sources of an export.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Sources<'a> {
-    /// The calibration, and its file.
-    pub calibration: Option<(&'a Calibration, &'a str)>,
-    /// Instead of a calibration: biases over temperature of a unit that stayed at rest, for [formats that take them](Format::takes_biases).
-    pub biases: Option<&'a ThermalBiases>,
-    /// Noise of the unit.
-    pub noise: Option<&'a NoiseFile>,
-}
+/// All formats, in the order of `mimu export --help`.
+pub static FORMATS: [Format; 27] = [
+    Format::of::<c::C>(),
+    Format::of::<rust::Rust>(),
+    Format::of::<json::Json>(),
+    Format::of::<kalibr::Kalibr>(),
+    Format::of::<openvins::OpenVins>(),
+    Format::of::<vins::Vins>(),
+    Format::of::<orbslam3::OrbSlam3>(),
+    Format::of::<liosam::LioSam>(),
+    Format::of::<fastlio::FastLio>(),
+    Format::of::<imu_calib::ImuCalib>(),
+    Format::of::<imu_tk::ImuTk>(),
+    Format::of::<fusion::Fusion>(),
+    Format::of::<realsense::RealSense>(),
+    Format::of::<depthai::DepthAi>(),
+    Format::of::<basalt::Basalt>(),
+    Format::of::<px4::Px4>(),
+    Format::of::<ardupilot::ArduPilot>(),
+    Format::of::<betaflight::Betaflight>(),
+    Format::of::<inav::Inav>(),
+    Format::of::<slimenrf::SlimeNrf>(),
+    Format::of::<pigeon::Pigeon>(),
+    Format::of::<iio::Iio>(),
+    Format::of::<ros_imu::RosImu>(),
+    Format::of::<autoware::Autoware>(),
+    Format::of::<gazebo::Gazebo>(),
+    Format::of::<matlab::Matlab>(),
+    Format::of::<core::Core>(),
+];
 
 /// An exported file.
 #[derive(Debug, Clone, Serialize)]
@@ -181,182 +129,82 @@ pub struct Export {
     /// Bytes of the file.
     #[serde(skip)]
     pub content: Vec<u8>,
+    #[serde(skip)]
+    noise: Noise,
 }
 
 impl Export {
     /// An export of these sources, without content.
-    pub fn new(to: &'static str, from: &Sources) -> Self {
+    pub(crate) fn new<T: Target>(from: &Sources) -> Self {
         let calibration = from.calibration.map(|(calibration, _)| calibration);
+        let notes = match T::NOISE {
+            Noise::Optional | Noise::Needed => from.other_device(),
+            Noise::No | Noise::Only => None,
+        };
         Self {
             format: "mimu-export/1",
-            to,
+            to: T::NAME,
             formulas: Vec::new(),
-            notes: Vec::new(),
+            notes: notes.into_iter().collect(),
             judgements: JudgedSource::all(from),
             calibration_errors: calibration.map(judged::errors_of).unwrap_or_default(),
             remaining: Vec::new(),
             parameters: Vec::new(),
             cubics: Vec::new(),
             content: Vec::new(),
+            noise: T::NOISE,
         }
     }
-}
 
-impl Sources<'_> {
-    /// The calibration and its file.
-    ///
-    /// # Errors
-    /// There is no calibration.
-    pub fn calibration(&self) -> Result<(&Calibration, &str)> {
-        self.calibration.ok_or_else(|| {
-            Error::new(
-                "export",
-                "this format needs a calibration",
-                "name a file of `mimu fit -o`",
-            )
-            .about(Argument::Calibration)
-        })
+    pub(crate) fn formula(&mut self, line: impl Into<String>) {
+        self.formulas.push(line.into());
     }
 
-    /// Refuses noise of other readings than those that the calibration is for: one of the two then belongs to another unit, or to the unit with another
-    /// range. Noise of calibrated readings in SI fits every calibration.
-    fn check_same_readings(&self) -> Result<()> {
-        let (Some((calibration, file)), Some(noise)) = (self.calibration, self.noise) else {
-            return Ok(());
-        };
-        for channel in &noise.channel {
-            let at = RAW_COLUMNS.iter().position(|name| *name == channel.name);
-            let scaled = channel.raw_unit.as_ref().zip(channel.scale_factor);
-            let Some(at) = at else { continue };
-            let Some(table) = calibration.table(Sensor::BOTH[at / 3]) else {
-                continue;
-            };
-            let ours = table.physical.scale_factor[at % 3];
-            let Some((unit, scale)) = scaled else {
-                self.check_alike(channel, ours, table.raw_unit)?;
-                continue;
-            };
-            let raw = table.raw_unit.to_string();
-            if *unit == raw && ((scale / ours).abs() - 1.0).abs() < OTHER_SCALE {
-                continue;
-            }
-            return Err(Error::new(
-                format!("{}, channel {}", noise.place, channel.name),
-                format!(
-                    "it was computed with a scale factor of {} {unit} per {}, and that of {file} is {} {raw}",
-                    significant(scale),
-                    channel.unit,
-                    significant(ours)
-                ),
-                "give noise and calibration of the same unit",
-            )
-            .about(Argument::Noise));
+    pub(crate) fn note(&mut self, line: impl Into<String>) {
+        self.notes.push(line.into());
+    }
+
+    /// For a format without curves: notes the temperature at which the exported calibration is valid.
+    pub(crate) fn temperature(&mut self, calibration: &Calibration) {
+        let temp_c = calibration.temperature.as_ref();
+        if let Some(temp_c) = temp_c.and(calibration.recording.temp_c) {
+            self.note(format!("The numbers are those at {temp_c:.1} °C."));
         }
-        Ok(())
     }
 
-    /// Refuses noise of which nobody says whether it is that of readings in SI before the calibration or after it, if the two differ: the densities of a
-    /// gyro whose driver reports half of the rate came out too small by half.
-    fn check_alike(&self, channel: &NoiseChannel, scale: f64, raw: RawUnit) -> Result<()> {
-        if raw != RawUnit::Si || (scale.abs() - 1.0).abs() < SAME_SCALE {
-            return Ok(());
+    /// For a format with continuous-time densities of the worst axis.
+    pub(crate) fn continuous_densities(&mut self, noise: &NoiseFile) {
+        let percent = 100.0 * noise.confidence;
+        self.formula(format!(
+            "Continuous-time densities of the worst axis; {percent} % interval behind each."
+        ));
+    }
+
+    /// For a format without a place for a calibration.
+    pub(crate) fn needs_calibrated(&mut self, from: &Sources) {
+        if from.calibration.is_some() {
+            self.note("The program has no place for a calibration: it needs calibrated readings, as `mimu apply` and the device make them.");
         }
-        let place = self.noise.map_or("", |noise| noise.place.as_str());
-        let problem = format!(
-            "the calibration changes these readings by a factor of {}, and the file does not say whether its noise is that before or after",
-            significant(1.0 / scale)
-        );
-        let remedy = "make it of the same readings with the calibration: mimu allan REC --calibration FILE -o noise.toml";
-        let place = format!("{place}, channel {}", channel.name);
-        Err(Error::new(place, problem, remedy).about(Argument::Noise))
     }
 
-    /// A note if calibration and noise have the names of different units.
-    pub(crate) fn other_device(&self) -> Option<String> {
-        let ((calibration, _), noise) = self.calibration.zip(self.noise)?;
-        (calibration.device != noise.device).then(|| {
-            format!(
-                "The calibration belongs to {:?} and the noise to {:?}: use the file only if these are one unit.",
-                calibration.device, noise.device
-            )
-        })
+    /// Sets the errors of a format with these `places`.
+    pub(crate) fn leaves(&mut self, calibration: &Calibration, places: Places) {
+        self.remaining = remaining::of(calibration, places);
     }
 
-    /// The noise of the unit.
-    ///
-    /// # Errors
-    /// The noise is missing.
-    pub fn noise(&self) -> Result<&NoiseFile> {
-        self.noise.ok_or_else(|| {
-            Error::new(
-                "export",
-                "this format needs the noise of the unit",
-                "record the unit at rest, and add its file: mimu allan REST --calibration cal.toml -o noise.toml, then --noise noise.toml",
-            )
-            .about(Argument::Noise)
-        })
-    }
-}
-
-impl Format {
-    /// Whether it stores the noise of a unit.
-    pub fn has_noise(&self) -> bool {
-        matches!(
-            self,
-            Self::Kalibr(_)
-                | Self::OpenVins(_)
-                | Self::Vins(_)
-                | Self::OrbSlam3(_)
-                | Self::LioSam(_)
-                | Self::FastLio(_)
-                | Self::DepthAi(_)
-                | Self::Basalt(_)
-                | Self::RosImu(_)
-                | Self::Autoware(_)
-                | Self::Gazebo(_)
-                | Self::Matlab(_)
-        )
+    /// The comments at the head of the file, as comments with the sign `sign`.
+    pub(crate) fn head(&self, sign: &str, from: &Sources) -> String {
+        heading::comments(sign, &heading::of(self, from))
     }
 
-    /// Whether it can be written from biases over temperature alone.
-    pub fn takes_biases(&self) -> bool {
-        matches!(self, Self::Px4(_) | Self::ArduPilot(_))
+    /// With the bytes of the file.
+    pub(crate) fn with(mut self, content: impl Into<Vec<u8>>) -> Self {
+        self.content = content.into();
+        self
     }
 
-    /// The file of this format.
-    ///
-    /// # Errors
-    /// A source is missing, or the format cannot store the calibration or the noise, as each module describes.
-    pub fn export(&self, from: &Sources) -> Result<Export> {
-        from.check_same_readings()?;
-        match self {
-            Self::C(options) => c::export(from, options),
-            Self::Kalibr(options) => kalibr::export(from, options),
-            Self::OpenVins(options) => openvins::export(from, options),
-            Self::Vins(options) => vins::export(from, options),
-            Self::OrbSlam3(options) => orbslam3::export(from, options),
-            Self::LioSam(options) => liosam::export(from, options),
-            Self::FastLio(options) => fastlio::export(from, options),
-            Self::ImuCalib(options) => imu_calib::export(from, options),
-            Self::ImuTk(options) => imu_tk::export(from, options),
-            Self::Fusion => fusion::export(from),
-            Self::RealSense(options) => realsense::export(from, options),
-            Self::Px4(options) => px4::export(from, options),
-            Self::ArduPilot(options) => ardupilot::export(from, options),
-            Self::DepthAi(options) => depthai::export(from, options),
-            Self::Basalt(options) => basalt::export(from, options),
-            Self::Betaflight(options) => betaflight::export(from, options),
-            Self::Inav(options) => inav::export(from, options),
-            Self::SlimeNrf(options) => slimenrf::export(from, options),
-            Self::Pigeon(options) => pigeon::export(from, options),
-            Self::Iio(options) => iio::export(from, options),
-            Self::RosImu(options) => ros_imu::export(from, options),
-            Self::Autoware(options) => autoware::export(from, options),
-            Self::Gazebo(options) => gazebo::export(from, options),
-            Self::Matlab(options) => matlab::export(from, options),
-            Self::Core => core::export(from),
-            Self::Json => json::export(from),
-            Self::Rust => rust::export(from),
-        }
+    /// The lines for the terminal: judgements, of which one that is not good is a warning, formulas, notes and errors.
+    pub fn for_terminal(&self) -> Vec<String> {
+        heading::for_terminal(self)
     }
 }

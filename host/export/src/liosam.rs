@@ -4,61 +4,60 @@
 //! dt. Between key frames, a bias may change by `imuAccBiasN √Δt`. Source: TixiaoShan/LIO-SAM, src/imuPreintegration.cpp (2023-04), the same on its
 //! branch ros2; include/utility.h for the names.
 
-use std::fmt::Write as _;
-
+use clap::Args;
+use mimu::quantity::Sensor::{Accel, Gyro};
+use mimu_allan::model::Term::{K, N};
 use mimu_recording::error::Result;
 
-use crate::worst_axis::{GravityOptions, WalkOptions, line};
-use crate::{Export, Sources, heading};
+use crate::worst_axis::{GravityOptions, WalkOptions, keys_file};
+use crate::{Export, Noise, Page, Sources, Target};
 
 /// Options of the file.
-#[derive(Debug, Clone)]
-#[cfg_attr(feature = "clap", derive(clap::Args))]
+#[derive(Debug, Clone, Args)]
 pub struct Options {
     /// Layout of parameters in ROS 2
-    #[cfg_attr(feature = "clap", arg(long))]
+    #[arg(long)]
     pub ros2: bool,
     /// Random walks.
-    #[cfg_attr(feature = "clap", command(flatten))]
+    #[command(flatten)]
     pub walks: WalkOptions,
     /// Gravity.
-    #[cfg_attr(feature = "clap", command(flatten))]
+    #[command(flatten)]
     pub gravity: GravityOptions,
 }
 
-/// The keys of the inertial unit.
-///
-/// # Errors
-/// The noise is missing, or an error of [`WalkOptions::densities`].
-pub fn export(from: &Sources, options: &Options) -> Result<Export> {
-    let noise = from.noise()?;
-    let densities = options.walks.calibrated(noise)?;
-    let mut export = Export::new("liosam", from);
-    export.formulas.push(format!(
-        "Continuous-time densities of the worst axis; {} % interval behind each.",
-        100.0 * noise.confidence
-    ));
-    export
-        .notes
-        .push("Copy these keys into params.yaml of LIO-SAM.".into());
-    export.notes.extend(heading::needs_calibrated(from));
-    let mut out = heading::comments("#", &heading::of_noise(noise, &export));
-    let (layout, indent) = match options.ros2 {
-        true => ("/**:\n  ros__parameters:\n", "    "),
-        false => ("lio_sam:\n", "  "),
-    };
-    out.push_str(layout);
-    let keys = [
-        ("imuAccNoise", "m/s^2/sqrt(Hz)", &densities.accel.white),
-        ("imuGyrNoise", "rad/s/sqrt(Hz)", &densities.gyro.white),
-        ("imuAccBiasN", "m/s^3/sqrt(Hz)", &densities.accel.walk),
-        ("imuGyrBiasN", "rad/s^2/sqrt(Hz)", &densities.gyro.walk),
-    ];
-    for (key, unit, density) in keys {
-        out.push_str(&line(indent, key, |density| density, unit, density));
+/// The format.
+pub struct LioSam;
+
+impl Target for LioSam {
+    type Options = Options;
+    const NAME: &str = "liosam";
+    const ABOUT: &str = "Noise for LIO-SAM";
+    const CONTENTS: &str = "noise, gravity";
+    const READERS: &str = "LIO-SAM (`--ros2` for its branch for ROS 2)";
+    const NOISE: Noise = Noise::Only;
+    const PAGES: &[Page] = &[Page::of("LIO-SAM", "liosam.yaml")];
+
+    /// # Errors
+    /// The noise is missing, or an error of [`WalkOptions::densities`].
+    fn export(from: &Sources, options: &Options) -> Result<Export> {
+        let mut export = Export::new::<Self>(from);
+        export.continuous_densities(from.noise()?);
+        export.note("Copy these keys into params.yaml of LIO-SAM.");
+        let (layout, indent) = match options.ros2 {
+            true => ("/**:\n  ros__parameters:\n", "    "),
+            false => ("lio_sam:\n", "  "),
+        };
+        let keys = [
+            ("imuAccNoise", "m/s^2/sqrt(Hz)", Accel, N),
+            ("imuGyrNoise", "rad/s/sqrt(Hz)", Gyro, N),
+            ("imuAccBiasN", "m/s^3/sqrt(Hz)", Accel, K),
+            ("imuGyrBiasN", "rad/s^2/sqrt(Hz)", Gyro, K),
+        ];
+        let text = ["", layout, indent];
+        let mut export = keys_file(export, from, &options.walks, text, keys, |density| density)?;
+        let gravity = options.gravity.line("imuGravity", from);
+        export.content.extend([indent, &gravity].concat().bytes());
+        Ok(export)
     }
-    let (gravity, source) = options.gravity.gravity(from);
-    let _ = writeln!(out, "{indent}imuGravity: {gravity:.6}  # m/s^2, {source}");
-    export.content = out.into_bytes();
-    Ok(export)
 }

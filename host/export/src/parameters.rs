@@ -1,11 +1,30 @@
-//! Parameters of autopilots, and their file layouts.
+//! What the exports to autopilots have in common: parameters and the layouts of their files, biases over temperature as cubics, and at one temperature
+//! an offset and a factor for each axis.
+//!
+//! At one temperature both autopilots compute `x_i = (v_i - offset_i) scale_i` from the driver's value of a raw reading, `v_i = si_per_raw_i (u_i -
+//! zero_i)`. With `u = P x + b`, and without the cross terms of P, `offset_i = si_per_raw_i (b_i - zero_i)` and `scale_i = 1 / (si_per_raw_i P_ii)`.
 
 use std::fmt::Write as _;
 
-use mimu::quantity::PerSensor;
+use clap::Args;
+use mimu::calibration::bias_cubic::{BiasCubics, Conversion};
+use mimu::quantity::{PerSensor, Sensor};
+use mimu::triad::Forward;
+use mimu_recording::RawUnit;
+use mimu_recording::error::{Argument, Result};
+use nalgebra::Vector3;
 use serde::Serialize;
 
-use crate::driver;
+use crate::convention::{Bias, Convention, Shape};
+use crate::remaining::{self, Places};
+use crate::{Export, Sources, driver, judged};
+
+/// The convention of both autopilots at one temperature; a gyro has no scale.
+pub(crate) const CONVENTION: Convention =
+    Convention::to_input(Shape::Axes, Bias::SubtractedFromReadings);
+
+/// Names of the axes in parameter names.
+pub(crate) const LETTERS: [&str; 3] = ["X", "Y", "Z"];
 
 /// A parameter of an autopilot.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -22,30 +41,20 @@ pub struct Parameter {
 impl Parameter {
     /// A value in single precision.
     pub fn real(name: String, value: f64) -> Self {
-        let value = f64::from(value as f32);
-        Self {
-            name,
-            value,
-            kind: 9,
-        }
+        let (value, kind) = (f64::from(value as f32), 9);
+        Self { name, value, kind }
     }
 
     /// An integer of 8 bits.
     pub fn int8(name: String, value: i8) -> Self {
-        Self {
-            name,
-            value: value.into(),
-            kind: 2,
-        }
+        let (value, kind) = (value.into(), 2);
+        Self { name, value, kind }
     }
 
     /// An integer of 32 bits.
     pub fn int32(name: String, value: i32) -> Self {
-        Self {
-            name,
-            value: value.into(),
-            kind: 6,
-        }
+        let (value, kind) = (value.into(), 6);
+        Self { name, value, kind }
     }
 
     /// The shortest decimal number without an exponent that equals the value in single precision.
@@ -58,23 +67,22 @@ impl Parameter {
 }
 
 /// Options common to PX4 and ArduPilot.
-#[derive(Debug, Clone)]
-#[cfg_attr(feature = "clap", derive(clap::Args))]
+#[derive(Debug, Clone, Args)]
 pub struct Options {
     /// Number of the inertial unit in the autopilot, from 1
-    #[cfg_attr(feature = "clap", arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=3)))]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=3))]
     pub imu: u8,
     /// Device id of the gyro in the autopilot (CAL_GYROn_ID, INS_GYR_ID)
-    #[cfg_attr(feature = "clap", arg(long, value_name = "ID"))]
+    #[arg(long, value_name = "ID")]
     pub gyro_id: Option<u32>,
     /// Device id of the accelerometer in the autopilot (CAL_ACCn_ID, INS_ACC_ID)
-    #[cfg_attr(feature = "clap", arg(long, value_name = "ID"))]
+    #[arg(long, value_name = "ID")]
     pub accel_id: Option<u32>,
     /// File for QGroundControl, five columns with tabs; without it NAME,VALUE for MAVProxy and Mission Planner
-    #[cfg_attr(feature = "clap", arg(long))]
+    #[arg(long)]
     pub qgc: bool,
     /// The driver's conversion.
-    #[cfg_attr(feature = "clap", command(flatten))]
+    #[command(flatten)]
     pub driver: driver::Options,
 }
 
@@ -84,16 +92,132 @@ impl Options {
         PerSensor::from([self.gyro_id, self.accel_id]).map(|id| id.map(|id| id as i32))
     }
 
-    /// Comments and parameters in the layout of the file.
-    pub fn text(&self, comments: &str, parameters: &[Parameter]) -> String {
-        let mut out = comments.to_owned();
-        for parameter in parameters {
+    /// The export with its comments and parameters in the layout of the file.
+    pub(crate) fn file(&self, export: Export, from: &Sources) -> Export {
+        let mut out = export.head("#", from);
+        for parameter in &export.parameters {
             let (name, value, kind) = (&parameter.name, parameter.text(), parameter.kind);
             let _ = match self.qgc {
                 false => writeln!(out, "{name},{value}"),
                 true => writeln!(out, "1\t1\t{name}\t{value}\t{kind}"),
             };
         }
-        out
+        export.with(out)
     }
+
+    /// Adds the biases of each sensor as cubics, with their formula and remaining errors.
+    ///
+    /// # Errors
+    /// An error of [`BiasCubics::of`] or [`BiasCubics::of_rest`].
+    pub(crate) fn cubics(
+        &self,
+        from: &Sources,
+        range_c: [f64; 2],
+        reference_c: f64,
+        export: &mut Export,
+    ) -> Result<()> {
+        let known = self.driver.conversions();
+        export.note(OWN_AXES);
+        for sensor in Sensor::BOTH {
+            let known = &known[sensor];
+            let (cubics, none) = match from.biases {
+                Some(biases) => (
+                    BiasCubics::of_rest(biases, sensor, known, range_c, reference_c)?,
+                    format!("The recording has no readings of the {sensor}: none are written."),
+                ),
+                None => (
+                    BiasCubics::of(from.calibration()?.0, sensor, known, range_c, reference_c)?,
+                    format!("The calibration has no curves of the {sensor}, so none are written."),
+                ),
+            };
+            let Some(cubics) = cubics else {
+                export.note(none);
+                continue;
+            };
+            if let Some(rms) = from.biases.and_then(|biases| biases.rms[sensor]) {
+                let error = judged::error_of_curves(&cubics, rms);
+                export.calibration_errors.push(error);
+            }
+            add(cubics, export);
+        }
+        if let Some((calibration, _)) = from.calibration {
+            // Of the general errors only those of the effects are added: the cubics report their own.
+            export.remaining.extend(remaining::effects(calibration));
+        }
+        Ok(())
+    }
+
+    /// Offset and factor of each axis of the calibrated triads, SI and SI per SI of the reading; adds formulas, notes and the remaining errors.
+    ///
+    /// # Errors
+    /// The calibration is missing, or an error of [`Conversion::of`].
+    pub(crate) fn offsets(
+        &self,
+        from: &Sources,
+        export: &mut Export,
+    ) -> Result<Vec<(Sensor, Vector3<f64>, Vector3<f64>)>> {
+        let (calibration, _) = from.calibration()?;
+        let known = self.driver.conversions();
+        export.formula("x = (v - offset) scale on each axis, raw to SI; v is the driver's output for a raw reading; a gyro has no scale.");
+        export.note(OWN_AXES);
+        export.leaves(calibration, Places::Axes);
+        let mut all = Vec::new();
+        for sensor in Sensor::BOTH {
+            let Some(forward) = calibration.inverse(sensor).as_ref().and_then(Forward::of) else {
+                export.note(format!(
+                    "The calibration has no {sensor}, so nothing is written for it."
+                ));
+                continue;
+            };
+            let conversion = Conversion::of(calibration, sensor, &known[sensor], &forward)?;
+            let converted = converted(&conversion, sensor.unit());
+            export.formula(format!("{sensor}: v = {converted}"));
+            let si = calibration.recording.raw_unit == RawUnit::Si;
+            if known[sensor].si_per_raw.is_none() && !si {
+                export.note(format!(
+                    "{sensor}: the driver is assumed to convert with the scale factors of the calibration. Give its factors with --{sensor}-si-per-raw."
+                ));
+            }
+            let gain = conversion.gain(&forward);
+            if sensor == Sensor::Gyro {
+                let error = remaining::scale_factors(sensor, &gain);
+                export.remaining.push(error);
+            }
+            all.push((sensor, conversion.bias(&forward), gain.map(f64::recip)));
+        }
+        Ok(all)
+    }
+}
+
+/// What to do about scale factors beyond the range.
+pub(crate) const GIVE_FACTOR: (&str, Argument) = (
+    "give the factor by which the driver converts",
+    Argument::AccelConversion,
+);
+
+const OWN_AXES: &str =
+    "Axes are those of the recording; they have to be those of the sensor in the autopilot.";
+
+/// The driver's conversion in a formula.
+fn converted(conversion: &Conversion, unit: &str) -> String {
+    let list = |values: [f64; 3]| values.map(|v| format!("{v:.6}")).join(", ");
+    let (factors, zeros) = (list(conversion.si_per_raw), list(conversion.zero_raw));
+    format!("[{factors}] (raw - [{zeros}]) {unit}, raw to SI")
+}
+
+fn add(cubics: BiasCubics, export: &mut Export) {
+    let sensor = cubics.sensor;
+    if let Some(settled_c) = cubics.settled_c {
+        export.note(format!(
+            "{sensor}: the errors below are those with the scale factors of {settled_c:.1} °C."
+        ));
+    }
+    let [from, to] = cubics.range_c;
+    export.formula(format!(
+        "{sensor}: reading = {}; the firmware then subtracts the bias, a cubic in (T - {:.1} °C) for T from {from:.1} to {to:.1} °C",
+        converted(&cubics.conversion, cubics.unit),
+        cubics.reference_c,
+    ));
+    export.remaining.extend(remaining::of_cubics(&cubics));
+    export.cubics.push(cubics);
 }

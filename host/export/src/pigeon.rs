@@ -6,50 +6,56 @@
 //!
 //! Source: Phoenix 5, ctre/phoenix/sensors/Pigeon2.h, `ConfigXAxisGyroError`; Phoenix 6 26.3, configs `GyroTrimConfigs` (range and unit).
 
-use mimu::quantity::AXES;
-use mimu_recording::error::{Argument, Error, Result};
+use mimu::quantity::Sensor;
+use mimu_recording::error::{Argument, Result};
 
+use crate::convention::{Bias, Convention, Shape, within};
 use crate::degrees_per_turn::gains;
-use crate::one_temperature::LETTERS;
-use crate::{Export, Sources, driver, heading};
-
-/// Options of the lines.
-pub type Options = driver::Options;
+use crate::parameters::LETTERS;
+use crate::{Export, Page, Sources, Target, driver};
 
 /// Largest number that Phoenix 6 takes, degrees per rotation.
 const MOST_DEG: f64 = 180.0;
 
-/// Lines for a program in Java, C++ or C#.
-///
-/// # Errors
-/// No gyro is calibrated, C is singular, or a number is beyond the range.
-pub fn export(from: &Sources, options: &Options) -> Result<Export> {
-    let (calibration, place) = from.calibration()?;
-    let mut export = Export::new("pigeon", from);
-    export.formulas.push(
-        "GyroScalar = 360 (gain - 1), degrees that the Pigeon reads too much in one rotation; gain: reading for a rate of 1".into(),
-    );
-    let gain = gains(calibration, place, options, &mut export)?;
-    export.notes.push("Record the rates of the device (getAngularVelocityXDevice and so on), with GyroTrim and MountPose at 0: the numbers belong to the axes of the Pigeon.".into());
-    export.notes.push("`config` is a Pigeon2Configuration; in Python the names are config.gyro_trim.gyro_scalar_x and so on. Phoenix Tuner X takes the same numbers.".into());
-    export.notes.push("The sign is that of CTRE's documentation. Check it by one turn: the error of the yaw has to become smaller.".into());
-    let mut lines = String::new();
-    for (i, letter) in LETTERS.iter().enumerate() {
-        let degrees = 360.0 * (gain[i] - 1.0);
-        if !(degrees.abs() <= MOST_DEG) {
-            return Err(Error::new(
-                format!("gyro, axis {}", AXES[i]),
-                format!("GyroScalar{letter} would be {degrees:.1} degrees per rotation, but its range is -180 to 180"),
+/// The format.
+pub struct Pigeon;
+
+impl Target for Pigeon {
+    type Options = driver::Options;
+    const NAME: &str = "pigeon";
+    const ABOUT: &str = "Scale factors of the gyro for a Pigeon 2 of CTR Electronics: GyroScalarX, Y and Z in degrees per rotation";
+    const CONTENTS: &str = "scale factors of the gyro";
+    const READERS: &str = "Pigeon 2 of CTR Electronics";
+    const CONVENTION: Convention = Convention::to_reading(Shape::Axes, Bias::Absent);
+    const PAGES: &[Page] = &[Page::of("Pigeon 2", "pigeon.txt")];
+
+    /// # Errors
+    /// No gyro is calibrated, C is singular, or a number is beyond the range.
+    fn export(from: &Sources, options: &driver::Options) -> Result<Export> {
+        let mut export = Export::new::<Self>(from);
+        export.formula("GyroScalar = 360 (gain - 1), degrees that the Pigeon reads too much in one rotation; gain: reading for a rate of 1");
+        let gain = gains(from, options, Self::CONVENTION, &mut export)?;
+        export.note("Record the rates of the device (getAngularVelocityXDevice and so on), with GyroTrim and MountPose at 0: the numbers belong to the axes of the Pigeon.");
+        export.note("`config` is a Pigeon2Configuration; in Python the names are config.gyro_trim.gyro_scalar_x and so on. Phoenix Tuner X takes the same numbers.");
+        export.note("The sign is that of CTRE's documentation. Check it by one turn: the error of the yaw has to become smaller.");
+        let mut out = export.head("//", from);
+        for (i, letter) in LETTERS.iter().enumerate() {
+            let degrees = 360.0 * (gain[i] - 1.0);
+            let name = format!("GyroScalar{letter}");
+            let remedy = (
                 "give the factor by which the readings were converted to rad/s",
-            )
-            .about(Argument::GyroConversion));
+                Argument::GyroConversion,
+            );
+            let value = (degrees, 1, " degrees per rotation");
+            within(
+                (Sensor::Gyro, i),
+                &name,
+                value,
+                [-MOST_DEG, MOST_DEG],
+                remedy,
+            )?;
+            out += &format!("config.GyroTrim.{name} = {degrees:.4};\n");
         }
-        lines.push_str(&format!(
-            "config.GyroTrim.GyroScalar{letter} = {degrees:.4};\n"
-        ));
+        Ok(export.with(out))
     }
-    let mut out = heading::comments("//", &heading::of_calibration(calibration, &export));
-    out.push_str(&lines);
-    export.content = out.into_bytes();
-    Ok(export)
 }

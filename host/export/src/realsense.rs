@@ -10,15 +10,14 @@
 //! Source: IntelRealSense/librealsense, src/ds/ds-private.h, `dm_v2_eeprom`; src/ds/ds-calib-parsers.cpp, `get_intrinsic`;
 //! src/proc/motion-transform.cpp, `correct_motion_helper`; tools/rs-imu-calibration/rs-imu-calibration.py, `get_eeprom` (2025-07).
 
+use clap::{Args, ValueEnum};
 use crc::{CRC_32_ISO_HDLC, Crc};
-use mimu::quantity::Sensor;
-use mimu_core::compensation::Affine;
 use mimu_recording::error::Result;
-use nalgebra::{Matrix3, Vector3};
 use serde_json::json;
 
-use crate::remaining::{self, Places};
-use crate::{Export, Sources, driver, heading};
+use crate::convention::{Bias, Convention, Parts, Shape};
+use crate::remaining::Places;
+use crate::{Export, Page, Sources, Target, driver, heading};
 
 /// Size of the EEPROM.
 const BYTES: usize = 520;
@@ -27,8 +26,7 @@ const UNUSED: u8 = 0xff;
 const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
 /// Layout of the file.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Layout {
     /// Bytes of the camera's EEPROM
     Eeprom,
@@ -37,68 +35,79 @@ pub enum Layout {
 }
 
 /// Options of the file.
-#[derive(Debug, Clone)]
-#[cfg_attr(feature = "clap", derive(clap::Args))]
+#[derive(Debug, Clone, Args)]
 pub struct Options {
     /// What to write
-    #[cfg_attr(feature = "clap", arg(long, value_enum, default_value = "eeprom"))]
+    #[arg(long, value_enum, default_value = "eeprom")]
     pub layout: Layout,
     /// The driver's conversion.
-    #[cfg_attr(feature = "clap", command(flatten))]
+    #[command(flatten)]
     pub driver: driver::Options,
 }
 
-/// The bytes or the text.
-///
-/// # Errors
-/// The calibration or a triad of it is missing, or C is singular.
-pub fn export(from: &Sources, options: &Options) -> Result<Export> {
-    let (calibration, place) = from.calibration()?;
-    let of = |sensor| options.driver.readings(calibration, place, sensor);
-    let [accel, gyro] = [of(Sensor::Accel)?, of(Sensor::Gyro)?];
-    let mut export = Export::new("realsense", from);
-    let (matrices, gyro_unit) = match options.layout {
-        Layout::Eeprom => ("sensitivity by columns", "deg/s"),
-        Layout::Json => ("scale_and_alignment by columns", "rad/s"),
-    };
-    export.formulas.push(format!(
-        "output = sensitivity reading - bias, SI to SI, in the frame of the calibration; {matrices}; bias of the accelerometer in m/s^2, of the gyro in {gyro_unit}"
-    ));
-    export.notes.extend([accel.line(), gyro.line()]);
-    export.notes.push("Axes have to be those of the depth sensor; the recording has to be made with the camera's motion correction off.".into());
-    export.notes.extend(heading::temperature(calibration));
-    let places = Places {
-        cross_terms: true,
-        temperature: false,
-        effects: false,
-    };
-    export.remaining = remaining::of(calibration, places)?;
-    export.content = match options.layout {
-        Layout::Eeprom => {
-            export.notes.push("The table of serial numbers is empty and there is no extrinsic calibration, as in the files of Intel's script.".into());
-            eeprom(&accel.inverse, &gyro.inverse)
+/// The format.
+pub struct RealSense;
+
+impl Target for RealSense {
+    type Options = Options;
+    const NAME: &str = "realsense";
+    const ABOUT: &str =
+        "Both triads for a RealSense camera: bytes of its EEPROM, or calibration.json";
+    const CONTENTS: &str = "C and o of both triads";
+    const READERS: &str =
+        "RealSense cameras of the D400 family with an inertial unit, such as the D435i";
+    const CONVENTION: Convention = Convention::to_input(Shape::Whole, Bias::SubtractedFromInput);
+    const PAGES: &[Page] = &[
+        Page::of("RealSense, EEPROM", "realsense.bin"),
+        Page {
+            options: "--layout json",
+            ..Page::of("RealSense, calibration.json", "realsense.json")
+        },
+    ];
+
+    /// # Errors
+    /// The calibration or a triad of it is missing, or C is singular.
+    fn export(from: &Sources, options: &Options) -> Result<Export> {
+        let (calibration, readings) = options.driver.both(from)?;
+        let mut export = Export::new::<Self>(from);
+        let (matrices, gyro_unit) = match options.layout {
+            Layout::Eeprom => ("sensitivity by columns", "deg/s"),
+            Layout::Json => ("scale_and_alignment by columns", "rad/s"),
+        };
+        export.formula(format!(
+            "output = sensitivity reading - bias, SI to SI, in the frame of the calibration; {matrices}; bias of the accelerometer in m/s^2, of the gyro in {gyro_unit}"
+        ));
+        export.note(readings.accel.line());
+        export.note(readings.gyro.line());
+        export.note("Axes have to be those of the depth sensor; the recording has to be made with the camera's motion correction off.");
+        export.temperature(calibration);
+        export.leaves(calibration, Places::Matrix);
+        let (accel, gyro) = (
+            Self::CONVENTION.of(&readings.accel)?,
+            Self::CONVENTION.of(&readings.gyro)?,
+        );
+        if options.layout == Layout::Eeprom {
+            export.note("The table of serial numbers is empty and there is no extrinsic calibration, as in the files of Intel's script.");
+            return Ok(export.with(eeprom(&accel, &gyro)));
         }
-        Layout::Json => {
-            let comments = heading::of_calibration(calibration, &export);
-            let triad = |model: &Affine<f64>| json!({"scale_and_alignment": model.matrix.as_slice(), "bias": (-model.offset).as_slice()});
-            let value = json!({
-                "device_type": "D435i",
-                "comment": comments,
-                "imus": [{"accelerometer": triad(&accel.inverse), "gyroscope": triad(&gyro.inverse)}],
-            });
-            (format!("{value:#}") + "\n").into_bytes()
-        }
-    };
-    Ok(export)
+        let triad = |of: &Parts| json!({"scale_and_alignment": of.left.as_slice(), "bias": of.bias.as_slice()});
+        let value = json!({
+            "device_type": "D435i",
+            "comment": heading::of(&export, from),
+            "imus": [{"accelerometer": triad(&accel), "gyroscope": triad(&gyro)}],
+        });
+        Ok(export.with(format!("{value:#}\n")))
+    }
 }
 
-fn eeprom(accel: &Affine<f64>, gyro: &Affine<f64>) -> Vec<u8> {
+fn eeprom(accel: &Parts, gyro: &Parts) -> Vec<u8> {
     // Flags: intrinsic, not extrinsic.
     let mut table = vec![0, 1, 0, 0];
     table.extend([UNUSED; 48]);
-    let in_degrees = gyro.offset.map(f64::to_degrees);
-    for (matrix, offset) in [(&accel.matrix, accel.offset), (&gyro.matrix, in_degrees)] {
-        table.extend(floats(matrix, &-offset));
+    let in_degrees = gyro.bias.map(f64::to_degrees);
+    for (matrix, bias) in [(accel.left, accel.bias), (gyro.left, in_degrees)] {
+        let values = matrix.iter().chain(bias.iter());
+        table.extend(values.flat_map(|v| (*v as f32).to_le_bytes()));
     }
     table.extend([UNUSED; 96]);
     let mut info = with_header([2, 1], 0x20, table);
@@ -119,9 +128,4 @@ fn with_header(version: [u8; 2], kind: u16, content: Vec<u8>) -> Vec<u8> {
     out.extend(CRC.checksum(&content).to_le_bytes());
     out.extend(content);
     out
-}
-
-fn floats(matrix: &Matrix3<f64>, bias: &Vector3<f64>) -> impl Iterator<Item = u8> {
-    let values: Vec<f64> = matrix.iter().chain(bias.iter()).copied().collect();
-    values.into_iter().flat_map(|v| (v as f32).to_le_bytes())
 }

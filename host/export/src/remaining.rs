@@ -5,6 +5,7 @@
 
 use mimu::calibration::bias_cubic::BiasCubics;
 use mimu::calibration::{Calibration, compensator};
+use mimu::effects::fitted::FittedEffect;
 use mimu::quantity::Sensor;
 use mimu::readable;
 use mimu::triad::Forward;
@@ -12,7 +13,6 @@ use mimu_core::compensation::{Affine, Compensation, Sample};
 use mimu_core::compensator::Compensator;
 use mimu_core::effects::{Effects, REFERENCE_C};
 use mimu_core::stored::NODES;
-use mimu_recording::error::Result;
 use nalgebra::{Matrix3, Vector3};
 use serde::Serialize;
 
@@ -41,40 +41,48 @@ pub struct Remaining {
     pub max: Option<f64>,
 }
 
-/// Parts of a calibration that a format can store. Every format stores scale factors and biases at one temperature.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Places {
-    /// Misalignment and non-orthogonality.
-    pub cross_terms: bool,
+/// How much of a calibration a format can store.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Places {
+    /// A factor and an offset for each axis, at one temperature.
+    Axes,
+    /// C and o at one temperature.
+    Matrix,
     /// All curves over temperature, and the lags of the dies.
-    pub temperature: bool,
-    /// Effects.
-    pub effects: bool,
+    Curves,
+    /// The effects too.
+    Effects,
 }
 
 impl Remaining {
-    fn new(sensor: Sensor, source: &str, condition: &str, errors: &[Vector3<f64>]) -> Self {
-        let squares: f64 = errors.iter().map(Vector3::norm_squared).sum();
+    /// An error with these figures, in the unit of `sensor`.
+    pub(crate) fn of(
+        sensor: Sensor,
+        source: impl Into<String>,
+        condition: impl Into<String>,
+        rms: Option<f64>,
+        max: Option<f64>,
+    ) -> Self {
         Self {
             sensor,
             source: source.into(),
             condition: condition.into(),
             unit: sensor.unit(),
-            rms: Some((squares / (3 * errors.len().max(1)) as f64).sqrt()),
-            max: Some(errors.iter().map(|e| e.amax()).fold(0.0, f64::max)),
+            rms,
+            max,
         }
+    }
+
+    fn new(sensor: Sensor, source: &str, condition: &str, errors: &[Vector3<f64>]) -> Self {
+        let squares: f64 = errors.iter().map(Vector3::norm_squared).sum();
+        let rms = (squares / (3 * errors.len().max(1)) as f64).sqrt();
+        let max = errors.iter().map(|e| e.amax()).fold(0.0, f64::max);
+        Self::of(sensor, source, condition, Some(rms), Some(max))
     }
 
     /// An error that nothing measured.
     pub(crate) fn unknown(sensor: Sensor, source: &str, condition: &str) -> Self {
-        Self {
-            sensor,
-            source: source.into(),
-            condition: condition.into(),
-            unit: sensor.unit(),
-            rms: None,
-            max: None,
-        }
+        Self::of(sensor, source, condition, None, None)
     }
 
     /// This error, or `rms` if that is larger.
@@ -87,13 +95,7 @@ impl Remaining {
 
     /// Scale factors and cross terms of readings that a program uses uncorrected; `matrix` maps the input to them, SI to SI.
     pub fn of_readings(sensor: Sensor, matrix: &Matrix3<f64>) -> Self {
-        let errors: Vec<_> = inputs(sensor).map(|x| matrix * x - x).collect();
-        Self::new(
-            sensor,
-            "scale factors and cross terms",
-            at_input(sensor),
-            &errors,
-        )
+        at_inputs(sensor, "scale factors and cross terms", |x| matrix * x - x)
     }
 
     /// The bias of readings that a program uses uncorrected, SI.
@@ -103,85 +105,59 @@ impl Remaining {
 
     /// Rounding to multiples of `step`, SI. The error is taken as uniform between half a step below and above.
     pub fn of_rounding(sensor: Sensor, step: f64) -> Self {
-        Self {
-            sensor,
-            source: "rounding of the file's numbers".into(),
-            condition: "constant".into(),
-            unit: sensor.unit(),
-            rms: Some(step / f64::sqrt(12.0)),
-            max: Some(0.5 * step),
-        }
+        let (source, rms) = ("rounding of the file's numbers", step / f64::sqrt(12.0));
+        Self::of(sensor, source, "constant", Some(rms), Some(0.5 * step))
     }
 
     /// The Earth's rate in the bias of a gyro that was calibrated at rest in an unknown attitude.
     pub fn of_earth_rate() -> Self {
         let rate = mimu::estimate::earth::RATE;
-        Self {
-            sensor: Sensor::Gyro,
-            source: "Earth's rate in the bias".into(),
-            condition: "in other attitudes than that of the recording".into(),
-            unit: Sensor::Gyro.unit(),
-            // As part of the bias, it is wrong once the unit is turned: by twice the rate if the unit points the other way.
-            rms: Some(rate * f64::sqrt(2.0 / 3.0)),
-            max: Some(2.0 * rate),
-        }
+        // As part of the bias, it is wrong once the unit is turned: by twice the rate if the unit points the other way.
+        let (rms, max) = (rate * f64::sqrt(2.0 / 3.0), 2.0 * rate);
+        let condition = "in other attitudes than that of the recording";
+        let source = "Earth's rate in the bias";
+        Self::of(Sensor::Gyro, source, condition, Some(rms), Some(max))
     }
 
     /// One line, in readable units.
     pub fn line(&self) -> String {
         let readable = readable::parameter(self.unit);
         let (sensor, source, condition) = (self.sensor, &self.source, &self.condition);
-        match (self.rms, self.max) {
-            (Some(rms), Some(max)) => format!(
-                "{sensor}: {source}, {condition}: rms {}, at most {}",
-                readable.write(rms),
-                readable.write(max)
-            ),
-            (Some(rms), None) => {
-                format!(
-                    "{sensor}: {source}, {condition}: rms {}",
-                    readable.write(rms)
-                )
-            }
-            (None, _) => format!("{sensor}: {source}: unknown, {condition}"),
-        }
+        let Some(rms) = self.rms.map(|rms| readable.write(rms)) else {
+            return format!("{sensor}: {source}: unknown, {condition}");
+        };
+        let most = self.max.map(|max| readable.write(max));
+        let most = most.map_or_else(String::new, |max| format!(", at most {max}"));
+        format!("{sensor}: {source}, {condition}: rms {rms}{most}")
     }
 }
 
 /// The errors of cubics of the biases.
 pub fn of_cubics(cubics: &BiasCubics) -> Vec<Remaining> {
     let each = cubics.remains.iter().map(|r| Remaining {
-        sensor: cubics.sensor,
-        source: r.source.into(),
-        condition: r.condition.into(),
         unit: cubics.unit,
-        rms: r.rms,
-        max: r.max,
+        ..Remaining::of(cubics.sensor, r.source, r.condition, r.rms, r.max)
     });
     each.collect()
 }
 
 /// The errors of a format with these `places`, and the uncertainty of the rest of `calibration`.
-///
-/// # Errors
-///
-/// This build cannot evaluate an effect.
-pub fn of(calibration: &Calibration, places: Places) -> Result<Vec<Remaining>> {
+pub fn of(calibration: &Calibration, places: Places) -> Vec<Remaining> {
     let mut all = Vec::new();
     for sensor in Sensor::BOTH {
         let Some(model) = calibration.inverse(sensor) else {
             continue;
         };
         all.push(interval(calibration, sensor, &model));
-        if !places.cross_terms {
+        if places < Places::Matrix {
             all.push(cross_terms(sensor, &model));
         }
         all.extend(over_temperature(calibration, sensor, &model, places));
     }
-    if !places.effects {
-        all.extend(effects(calibration)?);
+    if places < Places::Effects {
+        all.extend(effects(calibration));
     }
-    Ok(all)
+    all
 }
 
 /// Largest input that errors are given for, SI.
@@ -202,6 +178,12 @@ fn inputs(sensor: Sensor) -> impl Iterator<Item = Vector3<f64>> {
     (0..6).map(move |k| Vector3::ith(k / 2, if k % 2 == 0 { size } else { -size }))
 }
 
+/// The error that `of` gives at these inputs.
+fn at_inputs(sensor: Sensor, source: &str, of: impl Fn(Vector3<f64>) -> Vector3<f64>) -> Remaining {
+    let errors: Vec<_> = inputs(sensor).map(of).collect();
+    Remaining::new(sensor, source, at_input(sensor), &errors)
+}
+
 /// The error of the output of `sensor` that was measured on unseen data, SI; `None` if none was, or of another quantity.
 fn held_out(calibration: &Calibration, sensor: Sensor) -> Option<f64> {
     let judged = calibration.table(sensor)?.judged.as_ref()?;
@@ -211,11 +193,12 @@ fn held_out(calibration: &Calibration, sensor: Sensor) -> Option<f64> {
 /// Half of the 95 % interval of the calibrated output, from the covariance of C and o: at the next power-on, if the calibration is of several sessions. If
 /// unseen data erred by more, that error: intervals include what the fit knew, and a misfit of another recording is none of that.
 fn interval(calibration: &Calibration, sensor: Sensor, model: &Affine<f64>) -> Remaining {
-    const SOURCE: &str = "95 % interval of the calibrated output";
-    const TOMORROW: &str = "95 % interval of the calibrated output at the next power-on";
     let forward = Forward::of(model);
     let next = calibration.next_power_on(sensor);
-    let source = if next.is_some() { TOMORROW } else { SOURCE };
+    let source = match next {
+        Some(_) => "95 % interval of the calibrated output at the next power-on",
+        None => "95 % interval of the calibrated output",
+    };
     let of_fit = || {
         let table = calibration.table(sensor)?;
         Some((calibration.covariance(sensor)?, table.interval_sigmas()))
@@ -223,7 +206,7 @@ fn interval(calibration: &Calibration, sensor: Sensor, model: &Affine<f64>) -> R
     let (Some((covariance, sigmas)), Some(forward)) = (next.or_else(of_fit), forward) else {
         return Remaining::unknown(sensor, source, "the calibration has no intervals");
     };
-    let half = inputs(sensor).map(|x| {
+    let half = |x: Vector3<f64>| {
         let raw = forward.matrix * x + forward.bias;
         Vector3::from_fn(|row, _| {
             let mut gradient = [0.0; 12];
@@ -235,16 +218,13 @@ fn interval(calibration: &Calibration, sensor: Sensor, model: &Affine<f64>) -> R
                 .sum();
             sigmas * variance.max(0.0).sqrt()
         })
-    });
-    let interval = Remaining::new(sensor, source, at_input(sensor), &half.collect::<Vec<_>>());
-    interval.at_least(held_out(calibration, sensor))
+    };
+    at_inputs(sensor, source, half).at_least(held_out(calibration, sensor))
 }
 
 /// Error of a format without scale factors: a reading changes by `gain` with the input of its axis instead of by 1.
 pub fn scale_factors(sensor: Sensor, gain: &Vector3<f64>) -> Remaining {
-    let errors = inputs(sensor).map(|x| gain.component_mul(&x) - x);
-    let errors: Vec<_> = errors.collect();
-    Remaining::new(sensor, "scale factors", at_input(sensor), &errors)
+    at_inputs(sensor, "scale factors", |x| gain.component_mul(&x) - x)
 }
 
 /// Error of a format with one factor and one offset for each axis: cross-axis sensitivity remains.
@@ -253,12 +233,10 @@ fn cross_terms(sensor: Sensor, model: &Affine<f64>) -> Remaining {
         return Remaining::unknown(sensor, "cross terms", "C is singular");
     };
     let diagonal = forward.matrix.diagonal();
-    let errors = inputs(sensor).map(|x| {
+    at_inputs(sensor, "cross terms", |x| {
         let across = forward.matrix * x - diagonal.component_mul(&x);
         across.component_div(&diagonal)
-    });
-    let errors: Vec<_> = errors.collect();
-    Remaining::new(sensor, "cross terms", at_input(sensor), &errors)
+    })
 }
 
 fn over_temperature(
@@ -269,22 +247,19 @@ fn over_temperature(
 ) -> Vec<Remaining> {
     const BIAS: &str = "bias over temperature";
     const GAIN: &str = "scale factors and cross terms over temperature";
+    let unknown = |source| Remaining::unknown(sensor, source, "calibrated at one temperature");
     let over = calibration.temperature.as_ref().filter(|o| o.has(sensor));
     let (Some(over), Some(curves)) = (over, calibration.curves()) else {
-        let why = "calibrated at one temperature";
-        return [BIAS, GAIN]
-            .map(|source| Remaining::unknown(sensor, source, why))
-            .into();
+        return [BIAS, GAIN].map(unknown).into();
     };
     let mut all = Vec::new();
     if over.biases_only {
-        let why = "calibrated at one temperature";
-        all.push(Remaining::unknown(sensor, GAIN, why));
+        all.push(unknown(GAIN));
     }
-    if places.temperature {
+    if places >= Places::Curves {
         if over.lags_s().is_none() {
-            let why = "not determined";
-            all.push(Remaining::unknown(sensor, "lag of the dies", why));
+            let lag = Remaining::unknown(sensor, "lag of the dies", "not determined");
+            all.push(lag);
         }
         return all;
     }
@@ -292,66 +267,43 @@ fn over_temperature(
     let step = (to - from) / (TEMPERATURES - 1) as f64;
     let models = (0..TEMPERATURES).filter_map(|k| curves.inverse(sensor, from + step * k as f64));
     let forwards: Vec<Forward> = models.filter_map(|m| Forward::of(&m)).collect();
-    let error = |f: &Forward, x: &Vector3<f64>| model.apply(&(f.matrix * x + f.bias)) - x;
-    let zero = Vector3::zeros();
-    let biases: Vec<_> = forwards.iter().map(|f| error(f, &zero)).collect();
+    let error = |f: &Forward, x: Vector3<f64>| model.apply(&(f.matrix * x + f.bias)) - x;
+    let zero = |f: &Forward| error(f, Vector3::zeros());
     let range = format!("{from:.0} to {to:.0} °C");
-    all.push(Remaining::new(
-        sensor,
-        BIAS,
-        &format!("{range}, without input"),
-        &biases,
-    ));
+    let condition = format!("{range}, without input");
+    let biases: Vec<_> = forwards.iter().map(zero).collect();
+    all.push(Remaining::new(sensor, BIAS, &condition, &biases));
     if !over.biases_only {
-        let gains = forwards
-            .iter()
-            .flat_map(|f| inputs(sensor).map(|x| error(f, &x) - error(f, &zero)));
+        let gains = |f| inputs(sensor).map(move |x| error(f, x) - zero(f));
+        let gains: Vec<_> = forwards.iter().flat_map(gains).collect();
         let condition = format!("{range}, {}", at_input(sensor));
-        all.push(Remaining::new(
-            sensor,
-            GAIN,
-            &condition,
-            &gains.collect::<Vec<_>>(),
-        ));
+        all.push(Remaining::new(sensor, GAIN, &condition, &gains));
     }
     all
 }
 
 /// The error of each effect separately, as the device removes it.
-fn effects(calibration: &Calibration) -> Result<Vec<Remaining>> {
-    if calibration.effects().is_empty() {
-        return Ok(Vec::new());
-    }
+pub(crate) fn effects(calibration: &Calibration) -> Vec<Remaining> {
     let models = Compensation::from_fn(|s| calibration.inverse(s).unwrap_or_else(Affine::identity));
     let limits = calibration.limits();
-    let mut all = Vec::new();
-    for effect in calibration.effects() {
-        let unknown = || {
-            let why = "this program cannot evaluate it";
-            Remaining::unknown(effect.sensor(), &effect.id(), why)
+    let of = |effect: &FittedEffect| {
+        let (sensor, id) = (effect.sensor(), effect.id());
+        let alone = || {
+            let mut one = Effects::<f64, 8>::new(&models)?.within(limits);
+            one.push(effect.on_device().ok()?).ok()?;
+            Some(compensator(calibration, models, None, one))
         };
-        let mut one = Effects::<f64, 8>::new(&models).map(|e| e.within(limits));
-        let on_device = effect.on_device().ok();
-        let pushed = one.as_mut().zip(on_device);
-        let pushed = pushed.map(|(one, effect)| one.push(effect).is_ok());
-        let (Some(one), Some(true)) = (one, pushed) else {
-            all.push(unknown());
-            continue;
+        let Some(full) = alone() else {
+            return Remaining::unknown(sensor, &id, "this program cannot evaluate it");
         };
-        let full: Compensator<f64, NODES, 8> = compensator(calibration, models, None, one);
-        let errors = of_effect(&full, &models, effect.sensor(), limits);
-        let condition = match effect.sensor() {
+        let condition = match sensor {
             Sensor::Gyro => "at up to 100 deg/s and 1 g",
             Sensor::Accel => "at up to 1 g",
         };
-        all.push(Remaining::new(
-            effect.sensor(),
-            &effect.id(),
-            condition,
-            &errors,
-        ));
-    }
-    Ok(all)
+        let errors = of_effect(&full, &models, sensor, limits);
+        Remaining::new(sensor, &id, condition, &errors)
+    };
+    calibration.effects().iter().map(of).collect()
 }
 
 fn of_effect(
@@ -365,32 +317,31 @@ fn of_effect(
         return Vec::new();
     };
     let temperatures = limits.map_or(vec![REFERENCE_C], |[a, b]| vec![a, 0.5 * (a + b), b]);
+    let axes = Sensor::BOTH.map(|moved| [0, 1, 2].map(|axis| (moved, axis)));
     let mut errors = Vec::new();
     for temp_c in temperatures {
-        for after_s in AFTER_S {
-            for (moved, axis) in [(Sensor::Gyro, 0), (Sensor::Gyro, 1), (Sensor::Gyro, 2)]
-                .into_iter()
-                .chain([0, 1, 2].map(|axis| (Sensor::Accel, axis)))
-            {
-                let mut state = full.state(100.0);
-                full.follow(&mut state, 0.0, Some(temp_c));
-                full.follow(&mut state, after_s, Some(temp_c));
-                for k in 0..INPUTS {
-                    let share = 2.0 * k as f64 / (INPUTS - 1) as f64 - 1.0;
-                    let sample: Sample<f64> = Sample::from_fn(|s| {
-                        let x = match s == moved {
-                            true => Vector3::ith(axis, share * input(s)),
-                            // Gravity acts on the accelerometer also while the unit turns.
-                            false if s == Sensor::Accel => Vector3::ith((axis + 1) % 3, input(s)),
-                            false => Vector3::zeros(),
-                        };
-                        raw[s].matrix * x + raw[s].bias
-                    });
-                    // The conditions exclude angular acceleration, so the input must not appear to jump.
-                    state.gap();
-                    let with = full.apply(&mut state, &sample);
-                    errors.push(with[sensor] - models.apply(&sample)[sensor]);
-                }
+        for (after_s, (moved, axis)) in AFTER_S
+            .iter()
+            .flat_map(|s| axes.iter().flatten().map(move |a| (s, a)))
+        {
+            let mut state = full.state(100.0);
+            full.follow(&mut state, 0.0, Some(temp_c));
+            full.follow(&mut state, *after_s, Some(temp_c));
+            for k in 0..INPUTS {
+                let share = 2.0 * k as f64 / (INPUTS - 1) as f64 - 1.0;
+                let sample: Sample<f64> = Sample::from_fn(|s| {
+                    let x = match s == *moved {
+                        true => Vector3::ith(*axis, share * input(s)),
+                        // Gravity acts on the accelerometer also while the unit turns.
+                        false if s == Sensor::Accel => Vector3::ith((axis + 1) % 3, input(s)),
+                        false => Vector3::zeros(),
+                    };
+                    raw[s].matrix * x + raw[s].bias
+                });
+                // The conditions exclude angular acceleration, so the input must not appear to jump.
+                state.gap();
+                let with = full.apply(&mut state, &sample);
+                errors.push(with[sensor] - models.apply(&sample)[sensor]);
             }
         }
     }

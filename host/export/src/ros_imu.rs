@@ -7,56 +7,48 @@
 use mimu::quantity::{PerSensor, Sensor};
 use mimu_recording::error::Result;
 
-use crate::worst_axis::{Densities, NoiseOptions};
-use crate::{Export, Sources, heading, yaml};
+use crate::worst_axis::NoiseOptions;
+use crate::{Export, Noise, Page, Sources, Target, yaml};
 
-/// Options of the file.
-#[derive(Debug, Clone, Default)]
-#[cfg_attr(feature = "clap", derive(clap::Args))]
-pub struct Options {
-    /// Options common to all noise files.
-    #[cfg_attr(feature = "clap", command(flatten))]
-    pub noise: NoiseOptions,
-}
+/// The format.
+pub struct RosImu;
 
-/// Text of the file.
-///
-/// # Errors
-/// The noise is missing, or an error of [`crate::worst_axis::WalkOptions::axes`].
-pub fn export(from: &Sources, options: &Options) -> Result<Export> {
-    let noise = from.noise()?;
-    let rate = options.noise.rate_hz(noise);
-    let axes = options
-        .noise
-        .walks
-        .axes(noise, &PerSensor::both([1.0; 3]))?;
-    let mut export = Export::new("ros-imu", from);
-    export.formulas.push(format!(
-        "Variance of one message at {rate:.3} Hz: N^2 rate on the diagonal, (rad/s)^2 and (m/s^2)^2, by rows; axes are taken as independent."
-    ));
-    export.notes.push("This is the white noise of calibrated readings at rest. Vibration, and errors of the calibration, are not in it.".into());
-    export
-        .notes
-        .push("A covariance has no place for K, the walk of the bias.".into());
-    export.notes.extend(heading::needs_calibrated(from));
-    let mut out = heading::comments("#", &heading::of_noise(noise, &export));
-    let mut orientation = [0.0; 9];
-    orientation[0] = -1.0;
-    yaml::list(&mut out, "", "orientation_covariance", orientation);
-    for (key, sensor) in [
-        ("angular_velocity_covariance", Sensor::Gyro),
-        ("linear_acceleration_covariance", Sensor::Accel),
-    ] {
-        yaml::list(&mut out, "", key, diagonal(&axes[sensor], rate));
+impl Target for RosImu {
+    type Options = NoiseOptions;
+    const NAME: &str = "ros-imu";
+    const ABOUT: &str = "Covariances of sensor_msgs/Imu for ROS";
+    const CONTENTS: &str = "variances of one sample";
+    const READERS: &str = "nodes that publish `sensor_msgs/Imu`";
+    const NOISE: Noise = Noise::Only;
+    const PAGES: &[Page] = &[Page::of("ROS, sensor_msgs/Imu", "covariances.yaml")];
+
+    /// # Errors
+    /// The noise is missing, or an error of [`crate::worst_axis::WalkOptions::axes`].
+    fn export(from: &Sources, options: &NoiseOptions) -> Result<Export> {
+        let noise = from.noise()?;
+        let rate = options.rate_hz(noise);
+        let axes = options.walks.axes(noise, &PerSensor::both([1.0; 3]))?;
+        let mut export = Export::new::<Self>(from);
+        export.formula(format!(
+            "Variance of one message at {rate:.3} Hz: N^2 rate on the diagonal, (rad/s)^2 and (m/s^2)^2, by rows; axes are taken as independent."
+        ));
+        export.note("This is the white noise of calibrated readings at rest. Vibration, and errors of the calibration, are not in it.");
+        export.note("A covariance has no place for K, the walk of the bias.");
+        export.needs_calibrated(from);
+        let mut out = export.head("#", from);
+        let mut orientation = [0.0; 9];
+        orientation[0] = -1.0;
+        yaml::list(&mut out, "", "orientation_covariance", orientation);
+        for (key, sensor) in [
+            ("angular_velocity_covariance", Sensor::Gyro),
+            ("linear_acceleration_covariance", Sensor::Accel),
+        ] {
+            let mut covariance = [0.0; 9];
+            for (i, axis) in axes[sensor].iter().enumerate() {
+                covariance[4 * i] = axis.white.value.powi(2) * rate;
+            }
+            yaml::list(&mut out, "", key, covariance);
+        }
+        Ok(export.with(out))
     }
-    export.content = out.into_bytes();
-    Ok(export)
-}
-
-fn diagonal(axes: &[Densities; 3], rate: f64) -> [f64; 9] {
-    let mut out = [0.0; 9];
-    for (i, axis) in axes.iter().enumerate() {
-        out[4 * i] = axis.white.value.powi(2) * rate;
-    }
-    out
 }

@@ -6,9 +6,8 @@
 //! a change of the calibration is visible as a change of its numbers. Every `f32` is written as the shortest decimal number that equals it, so that
 //! results match the device's to the last bit.
 
-use std::fmt::Write as _;
-
 use mimu::calibration::reference_node;
+use mimu::quantity::Sensor;
 use mimu_core::compensation::{Affine, Compensation};
 use mimu_core::effects::{DeviceEffect, Directions, Variable};
 use mimu_core::stored;
@@ -16,171 +15,102 @@ use mimu_core::table::Node;
 use mimu_device::Image;
 use mimu_recording::error::{Error, Result};
 use nalgebra::Matrix3;
+use serde_json::{Value, json};
 
-use crate::remaining::{self, Places};
-use crate::{Export, Sources, heading};
+use crate::remaining::Places;
+use crate::template::fill;
+use crate::{Export, Nothing, Page, Sources, Target};
 
-/// Text of the module.
-///
-/// # Errors
-/// The errors of [`Image::new`]: a triad is missing, readings are in SI, or an effect cannot be removed on a device.
-pub fn export(from: &Sources) -> Result<Export> {
-    let (calibration, place) = from.calibration()?;
-    let image = Image::new(calibration, place)?;
-    let (mut nodes, mut effects) = (Vec::new(), Vec::new());
-    let read = stored::read(&image.bytes, |n| nodes.push(*n), |e| effects.push(*e));
-    let read = read.map_err(|refused| {
-        let problem = format!("the device could not use it: {refused}");
-        Error::new(place, problem, "fit the recording again")
-    })?;
-    let mut export = Export::new("rust", from);
-    export.formulas = vec![
-        "x = C u + o, raw to SI. compensator() makes it; state(), follow() and apply() of mimu_core::compensator::Compensator run it.".into(),
-        format!("It computes the same as the device with the calibration of hash {}, to the last bit.", image.hash),
-    ];
-    export.notes.extend(image.warnings);
-    let places = Places {
-        cross_terms: true,
-        temperature: true,
-        effects: true,
-    };
-    export.remaining = remaining::of(calibration, places)?;
-    let head = heading::comments("//!", &heading::of_calibration(calibration, &export));
-    let text = Module {
-        nodes: &nodes,
-        effects: &effects,
-        range_c: read.compensator.table.range_c(),
-        lags_s: read.lags_s.map(|lags| [lags.gyro, lags.accel]),
-    };
-    export.content = text.write(&head).into_bytes();
-    Ok(export)
-}
+/// The format.
+pub struct Rust;
 
-struct Module<'a> {
-    nodes: &'a [Node<f32>],
-    effects: &'a [DeviceEffect<f32>],
-    range_c: Option<[f32; 2]>,
-    lags_s: Option<[f32; 2]>,
-}
+impl Target for Rust {
+    type Options = Nothing;
+    const NAME: &str = "rust";
+    const ABOUT: &str = "Constants and a function for Rust programs with mimu-core";
+    const CONTENTS: &str = "everything, as constants";
+    const READERS: &str = "Rust programs with `mimu-core`";
+    const PAGES: &[Page] = &[Page::of("Rust with mimu-core", "calibration.rs")];
 
-impl Module<'_> {
-    fn write(&self, head: &str) -> String {
-        let mut out = format!("{head}\n#![allow(clippy::approx_constant)]\n\n");
-        out.push_str("use mimu_core::compensation::Affine;\nuse mimu_core::compensator::Compensator;\nuse mimu_core::die::DieLag;\n");
-        if !self.effects.is_empty() {
-            let mut used = vec!["DeviceEffect", "Directions", "Effects"];
-            if self.effects.iter().any(|e| e.product().is_some()) {
-                used.push("Variable");
-            }
-            let _ = writeln!(out, "use mimu_core::effects::{{{}}};", used.join(", "));
-        }
-        out.push_str("use mimu_core::table::{Node, Table};\n");
-        let sensors = self.effects.iter().any(|e| e.product().is_some());
-        out.push_str(match sensors {
-            true => "use mimu_core::{PerSensor, Sensor};\n",
-            false => "use mimu_core::PerSensor;\n",
+    /// # Errors
+    /// The errors of [`Image::new`]: a triad is missing, readings are in SI, or an effect cannot be removed on a device.
+    fn export(from: &Sources, _: &Nothing) -> Result<Export> {
+        let (calibration, place) = from.calibration()?;
+        let image = Image::new(calibration, place)?;
+        let (mut nodes, mut effects) = (Vec::new(), Vec::new());
+        let read = stored::read(&image.bytes, |n| nodes.push(*n), |e| effects.push(*e));
+        let read = read.map_err(|refused| {
+            let problem = format!("the device could not use it: {refused}");
+            Error::new(place, problem, "fit the recording again")
+        })?;
+        let mut export = Export::new::<Self>(from);
+        export.formula("x = C u + o, raw to SI. compensator() makes it; state(), follow() and apply() of mimu_core::compensator::Compensator run it.");
+        export.formula(format!(
+            "It computes the same as the device with the calibration of hash {}, to the last bit.",
+            image.hash
+        ));
+        export.notes.extend(image.warnings);
+        export.leaves(calibration, Places::Effects);
+        let [from_c, to_c] = read.compensator.table.range_c().unwrap_or_default();
+        let lags = read
+            .lags_s
+            .map(|l| format!("Some(PerSensor::from([{:?}, {:?}]))", l.gyro, l.accel));
+        let products = effects.iter().any(|e| e.product().is_some());
+        let values = json!({
+            "comments": export.head("//!", from),
+            "count": nodes.len(),
+            "nodes": nodes.iter().map(node).collect::<Value>(),
+            "room": effects.len(),
+            "effects": effects.iter().map(effect).collect::<Value>(),
+            "products": products,
+            "variable": if products { ", Variable" } else { "" },
+            "directions": directions(&nodes),
+            "ranged": read.compensator.table.range_c().is_some(),
+            "from_c": format!("{from_c:?}"),
+            "to_c": format!("{to_c:?}"),
+            "lags": lags.unwrap_or("None".into()),
         });
-        let _ = write!(
-            out,
-            "\n/// Nodes over temperature.\npub const NODES: usize = {};\n/// Room for effects of a triad and kind.\npub const ROOM: usize = {};\n",
-            self.nodes.len(),
-            self.effects.len()
-        );
-        out.push_str(TRIAD);
-        let _ = writeln!(
-            out,
-            "/// Temperature of the dies, °C; gyro (rad/s) and accelerometer (m/s²), raw to SI; their derivatives, per kelvin.\nconst NODE: [(f32, [Triad; 2], [Triad; 2]); NODES] = ["
-        );
-        for node in self.nodes {
-            let _ = writeln!(
-                out,
-                "    (\n        {:?},\n        {},\n        {},\n    ),",
-                node.temp_c,
-                triads(&node.model),
-                triads(&node.slope)
-            );
-        }
-        out.push_str("];\n\n");
-        self.constructor(&mut out);
-        out
-    }
-
-    fn constructor(&self, out: &mut String) {
-        out.push_str("/// The calibration, immutable, for any number of streams. `None` only if this version of mimu-core has no such effect.\npub fn compensator() -> Option<Compensator<f32, NODES, ROOM>> {\n");
-        out.push_str("    let nodes = NODE.iter().map(|(temp_c, model, slope)| Node {\n        temp_c: *temp_c,\n        model: PerSensor::from(model.map(affine)),\n        slope: PerSensor::from(slope.map(affine)),\n    });\n    let table = Table::new(nodes).ok()?;\n");
-        if let Some([from, to]) = self.range_c {
-            let _ = writeln!(
-                out,
-                "    // Temperatures of the dies that it was found from, °C.\n    let table = table.with_range([{from:?}, {to:?}]).ok()?;"
-            );
-        }
-        let lags = match self.lags_s {
-            Some([gyro, accel]) => {
-                format!("Some(PerSensor::from([{gyro:?}, {accel:?}]))")
-            }
-            None => "None".into(),
-        };
-        let _ = writeln!(
-            out,
-            "    // Seconds by which the dies of gyro and accelerometer follow the thermometer.\n    let lags = DieLag::of_triads({lags});"
-        );
-        let effects = match self.effects.is_empty() {
-            true => "None",
-            false => {
-                self.push_effects(out);
-                "Some(effects)"
-            }
-        };
-        let _ = writeln!(
-            out,
-            "    Some(Compensator {{\n        table,\n        lags,\n        effects: {effects},\n    }})\n}}"
-        );
-    }
-
-    fn push_effects(&self, out: &mut String) {
-        let temperatures: Vec<f64> = self.nodes.iter().map(|n| n.temp_c.into()).collect();
-        // Effects use the C that they were fitted with, as in the stored calibration.
-        let at = reference_node(&temperatures).unwrap_or_default();
-        let found_with = self.nodes[at].model.as_ref();
-        let directions =
-            found_with.map(|model| Directions::<f32>::of(&model.matrix.map(f64::from)));
-        out.push_str("    // Sensitive directions by rows, and their inverse.\n    let mut effects = Effects::of(PerSensor {\n");
-        for (sensor, of) in directions {
-            let Some(of) = of else { continue };
-            let _ = writeln!(
-                out,
-                "        {sensor}: Directions {{\n            sensed: affine(({}, [0.0; 3])).matrix,\n            to_body: affine(({}, [0.0; 3])).matrix,\n        }},",
-                rows(&of.sensed),
-                rows(&of.to_body)
-            );
-        }
-        out.push_str("    })\n    .within(table.limits());\n");
-        for effect in self.effects {
-            let _ = writeln!(
-                out,
-                "    // {effect}\n    let effect = {};\n    effects.push(effect.ok()?).ok()?;",
-                constructed(effect)
-            );
-        }
+        Ok(export.with(fill(include_str!("calibration.rs.in"), &values)))
     }
 }
 
-/// The expression that constructs an effect.
-fn constructed(effect: &DeviceEffect<f32>) -> String {
+fn node(node: &Node<f32>) -> Value {
+    json!({
+        "temp_c": format!("{:?}", node.temp_c),
+        "model": triads(&node.model),
+        "slope": triads(&node.slope),
+    })
+}
+
+/// Sensitive directions of C that the effects were fitted with, as in the stored calibration.
+fn directions(nodes: &[Node<f32>]) -> Value {
+    let temperatures: Vec<f64> = nodes.iter().map(|n| n.temp_c.into()).collect();
+    let at = reference_node(&temperatures).unwrap_or_default();
+    let found_with = nodes[at].model.as_ref().into_iter();
+    let of = |(sensor, model): (Sensor, &Affine<f32>)| {
+        let of = Directions::<f32>::of(&model.matrix.map(f64::from))?;
+        let (sensed, to_body) = (rows(&of.sensed), rows(&of.to_body));
+        Some(json!({"sensor": sensor.name(), "sensed": sensed, "to_body": to_body}))
+    };
+    found_with.filter_map(of).collect()
+}
+
+/// An effect and the expression that constructs it.
+fn effect(effect: &DeviceEffect<f32>) -> Value {
     let coefficients = list(effect.coefficients());
-    let sensor = format!("Sensor::{:?}", effect.sensor());
-    if let Some((axis, variables)) = effect.product() {
-        let names: Vec<String> = variables
-            .map(|v: Variable| format!("Variable::{v:?}"))
-            .collect();
-        let [coefficient] = effect.coefficients() else {
-            return String::new();
-        };
-        let names = names.join(", ");
-        return format!("DeviceEffect::term({sensor}, {axis}, {coefficient:?}, &[{names}])");
-    }
-    let nonlinear = effect.nonlinear();
-    format!("DeviceEffect::named(\"{effect}\", &{coefficients}, {nonlinear:?})")
+    let constructed = match (effect.product(), effect.coefficients()) {
+        (Some((axis, variables)), [coefficient]) => {
+            let names = variables.map(|v: Variable| format!("Variable::{v:?}"));
+            let names = names.collect::<Vec<_>>().join(", ");
+            let sensor = effect.sensor();
+            format!("DeviceEffect::term(Sensor::{sensor:?}, {axis}, {coefficient:?}, &[{names}])")
+        }
+        _ => {
+            let nonlinear = effect.nonlinear();
+            format!("DeviceEffect::named(\"{effect}\", &{coefficients}, {nonlinear:?})")
+        }
+    };
+    json!({"id": effect.to_string(), "constructed": constructed})
 }
 
 fn triads(of: &Compensation<f32>) -> String {
@@ -196,18 +126,3 @@ fn rows(matrix: &Matrix3<f32>) -> String {
 fn list(values: &[f32]) -> String {
     format!("{values:?}")
 }
-
-const TRIAD: &str = "
-/// C by rows, and o.
-type Triad = ([[f32; 3]; 3], [f32; 3]);
-
-fn affine((c, o): Triad) -> Affine<f32> {
-    let [[xx, xy, xz], [yx, yy, yz], [zx, zy, zz]] = c;
-    Affine {
-        // By columns.
-        matrix: [[xx, yx, zx], [xy, yy, zy], [xz, yz, zz]].into(),
-        offset: o.into(),
-    }
-}
-
-";

@@ -11,58 +11,62 @@
 //! Source: HKUST-Aerial-Robotics/VINS-Fusion, vins_estimator/src/factor/integration_base.h, `midPointIntegration`;
 //! estimator/parameters.cpp (2021-07); VINS-Mono, the same files (2024-05).
 
+use clap::Args;
+use mimu::quantity::Sensor::{Accel, Gyro};
+use mimu_allan::model::Term::{K, N};
 use mimu_recording::error::Result;
 
-use crate::worst_axis::{GravityOptions, NoiseOptions, line};
-use crate::{Export, Sources, heading};
+use crate::worst_axis::{GravityOptions, NoiseOptions, keys_file};
+use crate::{Export, Noise, Page, Sources, Target};
 
 /// Options of the file.
-#[derive(Debug, Clone)]
-#[cfg_attr(feature = "clap", derive(clap::Args))]
+#[derive(Debug, Clone, Args)]
 pub struct Options {
     /// Options common to all noise files.
-    #[cfg_attr(feature = "clap", command(flatten))]
+    #[command(flatten)]
     pub noise: NoiseOptions,
     /// Gravity.
-    #[cfg_attr(feature = "clap", command(flatten))]
+    #[command(flatten)]
     pub gravity: GravityOptions,
 }
 
-/// The keys of the inertial unit.
-///
-/// # Errors
-/// The noise is missing, or an error of [`crate::worst_axis::WalkOptions::densities`].
-pub fn export(from: &Sources, options: &Options) -> Result<Export> {
-    let noise = from.noise()?;
-    let densities = options.noise.walks.calibrated(noise)?;
-    let rate = options.noise.rate_hz(noise);
-    let mut export = Export::new("vins", from);
-    export.formulas.push(format!(
-        "Of one sample at {rate:.3} Hz: acc_n = N sqrt(rate), acc_w = K sqrt(rate), and so for the gyro; the worst axis, with the {} % interval behind each.",
-        100.0 * noise.confidence
-    ));
-    export.notes.push("VINS treats the two readings at the ends of an interval as independent. Multiplied by 1.41, acc_n and gyr_n give the right covariance.".into());
-    export.notes.push("Copy these keys into the configuration of VINS; its other keys are those of cameras and tracking.".into());
-    export.notes.extend(heading::needs_calibrated(from));
-    let mut out = "%YAML:1.0\n\n".to_owned();
-    out.push_str(&heading::comments("#", &heading::of_noise(noise, &export)));
-    let keys = [
-        ("acc_n", "m/s^2", &densities.accel.white),
-        ("gyr_n", "rad/s", &densities.gyro.white),
-        ("acc_w", "m/s^3", &densities.accel.walk),
-        ("gyr_w", "rad/s^2", &densities.gyro.walk),
-    ];
-    for (key, unit, density) in keys {
-        out.push_str(&line(
-            "",
-            key,
-            |density| density * rate.sqrt(),
-            unit,
-            density,
+/// The format.
+pub struct Vins;
+
+impl Target for Vins {
+    type Options = Options;
+    const NAME: &str = "vins";
+    const ABOUT: &str = "Noise for VINS-Fusion and VINS-Mono";
+    const CONTENTS: &str = "noise of one sample, gravity";
+    const READERS: &str = "VINS-Fusion, VINS-Mono";
+    const NOISE: Noise = Noise::Only;
+    const PAGES: &[Page] = &[Page::of("VINS-Fusion", "vins.yaml")];
+
+    /// # Errors
+    /// The noise is missing, or an error of [`crate::worst_axis::WalkOptions::densities`].
+    fn export(from: &Sources, options: &Options) -> Result<Export> {
+        let noise = from.noise()?;
+        let rate = options.noise.rate_hz(noise);
+        let mut export = Export::new::<Self>(from);
+        export.formula(format!(
+            "Of one sample at {rate:.3} Hz: acc_n = N sqrt(rate), acc_w = K sqrt(rate), and so for the gyro; the worst axis, with the {} % interval behind each.",
+            100.0 * noise.confidence
         ));
+        export.note("VINS treats the two readings at the ends of an interval as independent. Multiplied by 1.41, acc_n and gyr_n give the right covariance.");
+        export.note("Copy these keys into the configuration of VINS; its other keys are those of cameras and tracking.");
+        let keys = [
+            ("acc_n", "m/s^2", Accel, N),
+            ("gyr_n", "rad/s", Gyro, N),
+            ("acc_w", "m/s^3", Accel, K),
+            ("gyr_w", "rad/s^2", Gyro, K),
+        ];
+        let text = ["%YAML:1.0\n\n", "", ""];
+        let mut export = keys_file(export, from, &options.noise.walks, text, keys, |density| {
+            density * rate.sqrt()
+        })?;
+        export
+            .content
+            .extend(options.gravity.line("g_norm", from).bytes());
+        Ok(export)
     }
-    let (gravity, source) = options.gravity.gravity(from);
-    out.push_str(&format!("g_norm: {gravity:.6}  # m/s^2, {source}\n"));
-    export.content = out.into_bytes();
-    Ok(export)
 }

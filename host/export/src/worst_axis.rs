@@ -6,44 +6,43 @@
 //! If the record does not show a random walk on some axis, the value given by hand is used or, without one, the upper end of its interval. An
 //! estimator that believes a bias to be too steady cannot follow it; one that believes it to be too unsteady only follows it less smoothly.
 
+use clap::Args;
 use mimu::noise::noise_file::{NoiseChannel, NoiseFile};
 use mimu::quantity::{AXES, PerSensor, Sensor};
 use mimu::readable::STANDARD_GRAVITY;
 use mimu_allan::model::Term;
 use mimu_recording::error::{Argument, Error, Result};
 
-use crate::{Sources, yaml};
+use crate::driver::positive;
+use crate::{Export, Sources, yaml};
 
 /// Options of the random walks, the same for all programs.
-#[derive(Debug, Clone, Default)]
-#[cfg_attr(feature = "clap", derive(clap::Args))]
+#[derive(Debug, Clone, Default, Args)]
 pub struct WalkOptions {
     /// Random walk to state where the record shows none on some axis, rad/s²/√Hz
-    #[cfg_attr(feature = "clap", arg(long, value_name = "SI", value_parser = crate::options::positive))]
+    #[arg(long, value_name = "SI", value_parser = positive)]
     pub gyro_walk: Option<f64>,
     /// The same for the accelerometer, m/s³/√Hz
-    #[cfg_attr(feature = "clap", arg(long, value_name = "SI", value_parser = crate::options::positive))]
+    #[arg(long, value_name = "SI", value_parser = positive)]
     pub accel_walk: Option<f64>,
 }
 
 /// Options of programs that need the message rate too.
-#[derive(Debug, Clone, Default)]
-#[cfg_attr(feature = "clap", derive(clap::Args))]
+#[derive(Debug, Clone, Default, Args)]
 pub struct NoiseOptions {
     /// Messages a second; without it the rate of the recording
-    #[cfg_attr(feature = "clap", arg(long, value_name = "HZ", value_parser = crate::options::positive))]
+    #[arg(long, value_name = "HZ", value_parser = positive)]
     pub update_rate: Option<f64>,
     /// Random walks.
-    #[cfg_attr(feature = "clap", command(flatten))]
+    #[command(flatten)]
     pub walks: WalkOptions,
 }
 
 /// Option of programs that take local gravity with the noise.
-#[derive(Debug, Clone, Default)]
-#[cfg_attr(feature = "clap", derive(clap::Args))]
+#[derive(Debug, Clone, Default, Args)]
 pub struct GravityOptions {
     /// Local gravity, m/s²; without it that of the calibration, or else 9.80665
-    #[cfg_attr(feature = "clap", arg(long, value_name = "MPS2", value_parser = crate::options::positive))]
+    #[arg(long, value_name = "MPS2", value_parser = positive)]
     pub gravity: Option<f64>,
 }
 
@@ -77,14 +76,15 @@ impl NoiseOptions {
 }
 
 impl GravityOptions {
-    /// Gravity, m/s², and its origin.
-    pub fn gravity(&self, from: &Sources) -> (f64, &'static str) {
+    /// The line of YAML with gravity, and its origin.
+    pub(crate) fn line(&self, key: &str, from: &Sources) -> String {
         let calibrated = from.calibration.and_then(|(c, _)| c.recording.gravity_mps2);
-        match (self.gravity, calibrated) {
+        let (gravity, source) = match (self.gravity, calibrated) {
             (Some(given), _) => (given, "given by hand"),
             (None, Some(calibrated)) => (calibrated, "where it was calibrated"),
             (None, None) => (STANDARD_GRAVITY, "standard gravity"),
-        }
+        };
+        format!("{key}: {gravity:.6}  # m/s^2, {source}\n")
     }
 }
 
@@ -98,16 +98,9 @@ impl WalkOptions {
         noise: &NoiseFile,
         gain: &PerSensor<[f64; 3]>,
     ) -> Result<PerSensor<Densities>> {
-        let of = |sensor| -> Result<Densities> {
-            Ok(Densities {
-                white: worst(noise, sensor, Term::N, None, &gain[sensor])?,
-                walk: worst(noise, sensor, Term::K, self.given(sensor), &gain[sensor])?,
-            })
-        };
-        Ok(PerSensor {
-            accel: of(Sensor::Accel)?,
-            gyro: of(Sensor::Gyro)?,
-        })
+        let of = |s: Sensor| self.of(noise, s, &noise.of(s), &format!("the {s}"), &gain[s]);
+        let [accel, gyro] = [of(Sensor::Accel)?, of(Sensor::Gyro)?];
+        Ok(PerSensor { gyro, accel })
     }
 
     /// N and K of every axis, times `gain` of the axis, for programs that have a number for each.
@@ -119,48 +112,75 @@ impl WalkOptions {
         noise: &NoiseFile,
         gain: &PerSensor<[f64; 3]>,
     ) -> Result<PerSensor<[Densities; 3]>> {
-        let of = |sensor: Sensor, axis: usize| -> Result<Densities> {
-            let name = format!("{sensor}_{}", AXES[axis]);
-            let mut channels = noise.of(sensor);
-            channels.retain(|channel| channel.name == name);
-            let term = |term, given| {
-                worst_of(
-                    noise,
-                    &channels,
-                    &name,
-                    (sensor, term),
-                    given,
-                    &gain[sensor],
-                )
-            };
-            Ok(Densities {
-                white: term(Term::N, None)?,
-                walk: term(Term::K, self.given(sensor))?,
-            })
+        let of = |sensor: Sensor| -> Result<[Densities; 3]> {
+            let [x, y, z] = AXES.map(|axis| {
+                let name = format!("{sensor}_{axis}");
+                let mut channels = noise.of(sensor);
+                channels.retain(|channel| channel.name == name);
+                self.of(noise, sensor, &channels, &name, &gain[sensor])
+            });
+            Ok([x?, y?, z?])
         };
-        let three = |sensor| -> Result<[Densities; 3]> {
-            Ok([of(sensor, 0)?, of(sensor, 1)?, of(sensor, 2)?])
-        };
-        Ok(PerSensor {
-            accel: three(Sensor::Accel)?,
-            gyro: three(Sensor::Gyro)?,
-        })
+        let [accel, gyro] = [of(Sensor::Accel)?, of(Sensor::Gyro)?];
+        Ok(PerSensor { gyro, accel })
     }
 
-    /// [`Self::densities`] of calibrated readings.
-    ///
-    /// # Errors
-    /// The same as of [`Self::densities`].
-    pub fn calibrated(&self, noise: &NoiseFile) -> Result<PerSensor<Densities>> {
-        self.densities(noise, &PerSensor::both([1.0; 3]))
-    }
-
-    fn given(&self, sensor: Sensor) -> Option<f64> {
-        match sensor {
+    /// N and K of the worst of these channels of `sensor`, which are those of `name`.
+    fn of(
+        &self,
+        noise: &NoiseFile,
+        sensor: Sensor,
+        channels: &[&NoiseChannel],
+        name: &str,
+        gain: &[f64; 3],
+    ) -> Result<Densities> {
+        let walk = match sensor {
             Sensor::Gyro => self.gyro_walk,
             Sensor::Accel => self.accel_walk,
-        }
+        };
+        let of = |term, given| worst(noise, channels, name, (sensor, term), given, gain);
+        Ok(Densities {
+            white: of(Term::N, None)?,
+            walk: of(Term::K, walk)?,
+        })
     }
+}
+
+/// A key of a program's configuration: its name and unit, and the sensor and term of the density that it follows from.
+pub(crate) type Key = (&'static str, &'static str, Sensor, Term);
+
+/// The file of a program that takes the noise of calibrated readings and nothing else: `before` the comments, then `body`, and a line for each key, whose
+/// number `convert` makes of the density.
+///
+/// # Errors
+/// Those of [`WalkOptions::densities`].
+pub(crate) fn keys_file(
+    mut export: Export,
+    from: &Sources,
+    walks: &WalkOptions,
+    [before, body, indent]: [&str; 3],
+    keys: [Key; 4],
+    convert: impl Fn(f64) -> f64,
+) -> Result<Export> {
+    let densities = walks.densities(from.noise()?, &PerSensor::both([1.0; 3]))?;
+    export.needs_calibrated(from);
+    let lines = lines(indent, &keys, &densities, convert);
+    let head = export.head("#", from);
+    Ok(export.with([before, &head, body, &lines].concat()))
+}
+
+/// A line of YAML for each key, whose number `convert` makes of the density.
+pub(crate) fn lines(
+    indent: &str,
+    keys: &[Key],
+    densities: &PerSensor<Densities>,
+    convert: impl Fn(f64) -> f64,
+) -> String {
+    let of = |(key, unit, sensor, term): &Key| match term {
+        Term::N => line(indent, key, &convert, unit, &densities[*sensor].white),
+        _ => line(indent, key, &convert, unit, &densities[*sensor].walk),
+    };
+    keys.iter().map(of).collect()
 }
 
 /// Bias instability B of an axis, if the record shows it; the largest, if it was recorded at several temperatures.
@@ -172,13 +192,7 @@ pub(crate) fn instability(noise: &NoiseFile, sensor: Sensor, axis: &str) -> Opti
 }
 
 /// A line of YAML: the value that a program takes, which `convert` makes of the density `from`, its unit, and its interval in the same unit.
-pub fn line(
-    indent: &str,
-    key: &str,
-    convert: impl Fn(f64) -> f64,
-    unit: &str,
-    from: &Worst,
-) -> String {
+fn line(indent: &str, key: &str, convert: impl Fn(f64) -> f64, unit: &str, from: &Worst) -> String {
     let value = yaml::scientific(convert(from.value), 6);
     let mut comment = from.origin.clone();
     if let Some([lower, upper]) = from.interval.map(|ends| ends.map(&convert)) {
@@ -190,27 +204,8 @@ pub fn line(
     format!("{indent}{key}: {value}  # {unit}, {comment}\n")
 }
 
-/// The largest coefficient of `term` among the axes of `sensor`, with a comment.
+/// The largest coefficient of `term` among these `channels`, which are those of `name`, with a comment.
 fn worst(
-    file: &NoiseFile,
-    sensor: Sensor,
-    term: Term,
-    fallback: Option<f64>,
-    gain: &[f64; 3],
-) -> Result<Worst> {
-    let name = format!("the {sensor}");
-    worst_of(
-        file,
-        &file.of(sensor),
-        &name,
-        (sensor, term),
-        fallback,
-        gain,
-    )
-}
-
-/// The same among these `channels`, which are those of `name`.
-fn worst_of(
     file: &NoiseFile,
     channels: &[&NoiseChannel],
     name: &str,
@@ -219,52 +214,52 @@ fn worst_of(
     gain: &[f64; 3],
 ) -> Result<Worst> {
     let place = &file.place;
-    let Some(first) = channels.first() else {
-        return Err(Error::new(
+    let no_channel = || {
+        let problem = format!("it has no channel of {name}");
+        Error::new(
             place,
-            format!("it has no channel of {name}"),
+            problem,
             "record both sensors: the file needs all six axes",
-        ));
+        )
     };
+    let first = channels.first().ok_or_else(no_channel)?;
     if let Err(other) = first.model_in(sensor.unit()) {
         let problem = format!("its unit is {}, not {}", other.found, sensor.unit());
         return Err(other.refused(format!("{place}, channel {}", first.name), problem));
     }
-    let mut largest: Option<Worst> = None;
-    let mut missing: Vec<(&NoiseChannel, &str)> = Vec::new();
-    let mut take = |value: f64, interval: Option<[f64; 2]>, origin: String| {
-        if largest.as_ref().is_none_or(|worst| value > worst.value) {
-            largest = Some(Worst {
-                value,
-                interval,
-                origin,
-                remark: None,
-            });
-        }
-    };
+    let (mut seen, mut missing) = (Vec::new(), Vec::new());
     for channel in channels {
-        let (name, bound) = (&channel.name, channel.k_at_most);
+        let name = &channel.name;
         let axis = AXES.iter().position(|axis| name.ends_with(axis));
         let gain = axis.map_or(1.0, |axis| gain[axis]);
-        match (channel.get(term), bound) {
-            (Ok(c), _) => take(
-                gain * c.value,
-                Some([gain * c.lower, gain * c.upper]),
-                name.clone(),
-            ),
+        let (value, interval, origin) = match (channel.get(term), channel.k_at_most) {
+            (Ok(c), _) => {
+                let ends = [gain * c.lower, gain * c.upper];
+                (gain * c.value, Some(ends), name.clone())
+            }
             (Err(_), Some(bound)) if term == Term::K && fallback.is_none() => {
                 let origin = format!("{name}: not seen, the upper end of its interval");
-                take(gain * bound, None, origin);
+                (gain * bound, None, origin)
             }
-            (Err(why), _) => missing.push((channel, why)),
-        }
+            (Err(why), _) => {
+                missing.push((name.as_str(), why));
+                continue;
+            }
+        };
+        seen.push(Worst {
+            value,
+            interval,
+            origin,
+            remark: None,
+        });
     }
-    let largest = match (largest, missing.is_empty()) {
-        (Some(worst), true) => return Ok(worst),
-        (largest, _) => largest,
+    let larger = |a: Worst, b: Worst| if b.value > a.value { b } else { a };
+    let largest = seen.into_iter().reduce(larger);
+    let Some((channel, why)) = missing.first() else {
+        return largest.ok_or_else(no_channel);
     };
-    let names: Vec<&str> = missing.iter().map(|(c, _)| c.name.as_str()).collect();
     if let Some(fallback) = fallback {
+        let names: Vec<&str> = missing.iter().map(|(name, _)| *name).collect();
         let unseen = format!("not seen on {}", names.join(", "));
         // Uses the larger of the two: axes with a visible walk do not limit that of the others.
         return Ok(match largest.filter(|worst| worst.value >= fallback) {
@@ -280,13 +275,12 @@ fn worst_of(
             },
         });
     }
-    let (channel, why) = missing[0];
     let remedy = match term {
         Term::K => "record for longer, or give one",
         _ => "record again, at rest",
     };
     let error = Error::new(
-        format!("{place}, channel {}", channel.name),
+        format!("{place}, channel {channel}"),
         format!("{} ({}): {why}", term.letter(), term.name()),
         remedy,
     );

@@ -6,7 +6,7 @@ use clap::{Arg, ArgMatches, Args, Command, FromArgMatches, Subcommand};
 use mimu::calibration::Calibration;
 use mimu::calibration::thermal_biases::{self, ThermalBiases};
 use mimu::noise::noise_file::NoiseFile;
-use mimu_export::{Export, Format, Sources, heading};
+use mimu_export::{Choice, Export, Noise, Sources};
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::read_text;
 use mimu_recording::result_file::stage;
@@ -37,7 +37,7 @@ pub struct ExportArgs {
 
 /// A format, and the calibration that may follow its name.
 struct FormatOf {
-    format: Format,
+    choice: Choice,
     calibration: Option<PathBuf>,
 }
 
@@ -64,7 +64,7 @@ impl FromArgMatches for FormatOf {
     fn from_arg_matches(matches: &ArgMatches) -> std::result::Result<Self, clap::Error> {
         let file = matches.subcommand().map(|(_, of)| of.get_one(FILE));
         Ok(Self {
-            format: Format::from_arg_matches(matches)?,
+            choice: Choice::from_arg_matches(matches)?,
             calibration: file.flatten().cloned(),
         })
     }
@@ -80,15 +80,15 @@ impl FromArgMatches for FormatOf {
 
 impl Subcommand for FormatOf {
     fn augment_subcommands(command: Command) -> Command {
-        Self::with_file(Format::augment_subcommands(command))
+        Self::with_file(Choice::augment_subcommands(command))
     }
 
     fn augment_subcommands_for_update(command: Command) -> Command {
-        Self::with_file(Format::augment_subcommands_for_update(command))
+        Self::with_file(Choice::augment_subcommands_for_update(command))
     }
 
     fn has_subcommand(name: &str) -> bool {
-        Format::has_subcommand(name)
+        Choice::has_subcommand(name)
     }
 }
 
@@ -106,9 +106,9 @@ pub fn run(args: &ExportArgs) -> Result<()> {
         .out
         .as_deref()
         .ok_or_else(|| Error::new("-o", "it is missing", "name the file to write: -o FILE"))?;
-    let format = &args.to.format;
+    let choice = &args.to.choice;
     let file = args.calibration.as_ref().or(args.to.calibration.as_ref());
-    if args.noise.is_some() && !format.has_noise() {
+    if args.noise.is_some() && choice.format.noise == Noise::No {
         let problem = "this format cannot contain the noise of a unit";
         return Err(Error::new("export", problem, "leave it out").about(Argument::Noise));
     }
@@ -122,7 +122,7 @@ pub fn run(args: &ExportArgs) -> Result<()> {
     let (mut calibration, mut biases) = (None, None);
     if let (Some(path), Some(place)) = (file, &named) {
         let text = read_text(path)?;
-        match format.takes_biases() && thermal_biases::is_one(&text) {
+        match choice.format.takes_biases && thermal_biases::is_one(&text) {
             true => biases = Some(ThermalBiases::parse(&text, place)?),
             false => calibration = Some(Calibration::parse(&text, place)?),
         }
@@ -133,14 +133,14 @@ pub fn run(args: &ExportArgs) -> Result<()> {
         biases: biases.as_ref(),
         noise: noise.as_ref(),
     };
-    let export = format.export(&from)?;
+    let export = choice.export(&from)?;
     let content = export.content.clone();
     let result = ExportResult {
         file: path.display().to_string(),
         bytes: content.len(),
         export,
     };
-    let mut lines = heading::for_terminal(&result.export);
+    let mut lines = result.export.for_terminal();
     lines.push(format!("{}: {}", result.export.to, result.file));
     let text = lines.join("\n") + "\n";
     print(&args.json, &text, &result, Some(stage(path, content)?))

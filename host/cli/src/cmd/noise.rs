@@ -7,8 +7,9 @@ use mimu::calibration::Calibration;
 use mimu::in_use::{Against, NoiseInUse, Trajectory, noise_in_use};
 use mimu::noise::noise_file::NoiseFile;
 use mimu::prepared::Prepared;
+use mimu_export::kalibr::{self, Kalibr};
 use mimu_export::worst_axis::{NoiseOptions, WalkOptions};
-use mimu_export::{Format, Sources, driver, kalibr};
+use mimu_export::{Sources, Target, driver};
 use mimu_recording::error::Result;
 use mimu_recording::{MANIFEST_FILE, Recording};
 
@@ -134,5 +135,5 @@ fn kalibr_file(noise: &NoiseFile) -> Result<Vec<u8>> {
         biases: None,
         noise: Some(noise),
     };
-    Ok(Format::Kalibr(options).export(&from)?.content)
+    Ok(Kalibr::export(&from, &options)?.content)
 }

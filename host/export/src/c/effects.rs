@@ -1,7 +1,5 @@
 //! Effects in the header: their regressors as C expressions.
 
-mod removal;
-
 use mimu::calibration::Calibration;
 use mimu::effects::fitted::FittedEffect;
 use mimu::effects::quantity::Quantity;
@@ -10,17 +8,18 @@ use mimu::quantity::{PerSensor, Sensor};
 use mimu_core::die::BEYOND_C;
 use mimu_core::effects::{Directions, RATE_LAG_S};
 use mimu_recording::error::{Error, Result};
+use serde_json::{Value, json};
 
-use super::number;
+use super::{number, rows};
 
 /// The effects of a calibration.
 pub(super) struct Effects {
     /// Ids of the effects in the header.
     pub written: Vec<String>,
-    /// Ids of the effects that are left out.
-    pub left_out: Vec<String>,
+    /// Number of effects that are left out.
+    pub left_out: usize,
     /// Lags of the temperatures that the effects need, s.
-    pub lags_s: Vec<f64>,
+    lags_s: Vec<f64>,
     /// Summed error of each of the three axes.
     errors: PerSensor<[Vec<String>; 3]>,
     directions: PerSensor<Option<Directions<f64>>>,
@@ -37,7 +36,7 @@ impl Effects {
         };
         let mut all = Self {
             written: Vec::new(),
-            left_out: Vec::new(),
+            left_out: 0,
             lags_s: Vec::new(),
             errors: PerSensor::default(),
             directions: PerSensor::from_fn(direction),
@@ -48,11 +47,8 @@ impl Effects {
         };
         for effect in calibration.effects() {
             if all.directions[effect.sensor()].is_none() {
-                let place = format!(
-                    "calibration of {:?}, [{}]",
-                    calibration.device,
-                    effect.sensor()
-                );
+                let (device, sensor) = (&calibration.device, effect.sensor());
+                let place = format!("calibration of {device:?}, [{sensor}]");
                 return Err(Error::new(
                     place,
                     "C is singular",
@@ -61,7 +57,7 @@ impl Effects {
             }
             match all.add(effect) {
                 Some(()) => all.written.push(effect.id()),
-                None => all.left_out.push(effect.id()),
+                None => all.left_out += 1,
             }
         }
         all.quantities.sort_unstable();
@@ -71,34 +67,60 @@ impl Effects {
 
     /// Whether no effect applies to compensated samples.
     pub fn is_empty(&self) -> bool {
-        Sensor::BOTH
-            .into_iter()
-            .all(|sensor| self.is_none_of(sensor))
+        self.sensors().next().is_none()
     }
 
-    fn is_none_of(&self, sensor: Sensor) -> bool {
-        self.errors[sensor].iter().all(Vec::is_empty)
+    /// Sensors with effects.
+    fn sensors(&self) -> impl Iterator<Item = Sensor> + '_ {
+        let both = Sensor::BOTH.into_iter();
+        both.filter(|s| self.errors[*s].iter().any(|terms| !terms.is_empty()))
     }
 
     /// Whether some effects depend on temperature or time.
     pub fn is_slow(&self) -> bool {
-        self.quantities.iter().any(|q| q.is_slow())
+        self.has(|q| q.is_slow())
     }
 
     fn has(&self, of: impl Fn(&Quantity) -> bool) -> bool {
         self.quantities.iter().any(of)
     }
 
-    fn is_thermal(&self) -> bool {
-        self.has(|q| q.is_thermal())
-    }
-
-    fn has_time(&self) -> bool {
-        self.has(|q| *q == Quantity::Time)
-    }
-
-    fn turns(&self) -> bool {
-        self.has(|q| matches!(q, Quantity::AngularAcceleration(_)))
+    /// Values of the template: of the sensors with effects, of the lags, and of what else the effects depend on.
+    pub fn values(&self) -> Value {
+        let removed = self.sensors().filter_map(|sensor| {
+            let directions = self.directions[sensor].as_ref()?;
+            let (own, inputs) = match sensor {
+                Sensor::Gyro => ("rate", "clean, read_force"),
+                Sensor::Accel => ("force", "read_rate, clean"),
+            };
+            let errors = self.errors[sensor].iter().enumerate();
+            let errors = errors.map(|(axis, terms)| match terms.is_empty() {
+                true => json!({"axis": axis, "sum": "0.0f"}),
+                false => json!({"axis": axis, "sum": terms.join("\n         + ")}),
+            });
+            Some(json!({
+                "sensor": sensor.name(),
+                "unit": sensor.unit(),
+                "D": rows(&directions.sensed),
+                "R": rows(&directions.to_body),
+                "own": own,
+                "inputs": inputs,
+                "errors": errors.collect::<Value>(),
+            }))
+        });
+        let lags = self.lags_s.iter().enumerate();
+        let lags = lags.map(|(at, lag_s)| json!({"at": at, "lag_s": number(*lag_s)}));
+        let [least, most] = self.seen_c.unwrap_or_default().map(number);
+        json!({
+            "removed": removed.collect::<Value>(),
+            "lags": lags.collect::<Value>(),
+            "time": self.has(|q| *q == Quantity::Time),
+            "thermal": self.has(|q| q.is_thermal()),
+            "turns": self.has(|q| matches!(q, Quantity::AngularAcceleration(_))),
+            "limited": self.seen_c.is_some(),
+            "least": least,
+            "most": most,
+        })
     }
 
     fn add(&mut self, effect: &FittedEffect) -> Option<()> {

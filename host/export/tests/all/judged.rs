@@ -3,7 +3,11 @@
 use mimu::calibration::{Calibration, Judged};
 use mimu::judgement::{Judgement, JudgementKind};
 use mimu::quantity::Sensor;
-use mimu_export::{Export, Format, Sources};
+use mimu_export::core::Core;
+use mimu_export::fusion::Fusion;
+use mimu_export::json::Json;
+use mimu_export::rust::Rust;
+use mimu_export::{Nothing, Sources, Target};
 
 /// Held-out error of the accelerometer, m/s².
 const HELD_OUT: f64 = 0.0115;
@@ -25,19 +29,21 @@ fn misfit() -> Calibration {
     calibration
 }
 
-fn exported(format: &Format, calibration: &Calibration) -> Export {
-    let from = Sources {
-        calibration: Some((calibration, "cal.toml")),
-        ..Sources::default()
-    };
-    format.export(&from).unwrap()
-}
-
 #[test]
 fn an_export_says_how_its_calibration_is_judged_and_how_much_unseen_data_erred() {
     let calibration = misfit();
-    for format in [Format::Rust, Format::Json, Format::Fusion, Format::Core] {
-        let export = exported(&format, &calibration);
+    let from = Sources {
+        calibration: Some((&calibration, "cal.toml")),
+        ..Sources::default()
+    };
+    let none = Nothing {};
+    let exports = [
+        Rust::export(&from, &none),
+        Json::export(&from, &none),
+        Fusion::export(&from, &none),
+        Core::export(&from, &none),
+    ];
+    for export in exports.map(mimu_recording::error::Result::unwrap) {
         let [judged] = &export.judgements[..] else {
             panic!("{:?}", export.judgements);
         };

@@ -1,8 +1,12 @@
 //! Files for programs that take one noise figure for three axes.
 
 use mimu::noise::noise_file::{FileCoefficient, NOISE_FORMAT, NoiseChannel, NoiseFile};
+use mimu_export::fastlio::{self, FastLio};
+use mimu_export::liosam::{self, LioSam};
+use mimu_export::orbslam3::OrbSlam3;
+use mimu_export::vins::{self, Vins};
 use mimu_export::worst_axis::NoiseOptions;
-use mimu_export::{Format, Sources, fastlio, liosam, vins};
+use mimu_export::{Sources, Target};
 
 /// Ends of every interval, relative to its value.
 const ENDS: [f64; 2] = [0.9, 1.2];
@@ -62,30 +66,28 @@ fn the_interval_beside_a_figure_is_in_the_unit_of_the_figure() {
         ..Sources::default()
     };
     let common = NoiseOptions::default;
-    let formats = [
-        Format::Vins(vins::Options {
-            noise: common(),
-            gravity: Default::default(),
-        }),
-        Format::FastLio(fastlio::Options {
-            noise: common(),
-            ros2: false,
-        }),
-        Format::LioSam(liosam::Options {
-            walks: Default::default(),
-            gravity: Default::default(),
-            ros2: false,
-        }),
-        Format::OrbSlam3(common()),
+    // The power of a density: FAST-LIO takes variances.
+    let vins = vins::Options {
+        noise: common(),
+        gravity: Default::default(),
+    };
+    let fastlio = fastlio::Options {
+        noise: common(),
+        ros2: false,
+    };
+    let liosam = liosam::Options {
+        walks: Default::default(),
+        gravity: Default::default(),
+        ros2: false,
+    };
+    let exports = [
+        (Vins::export(&from, &vins), 1),
+        (FastLio::export(&from, &fastlio), 2),
+        (LioSam::export(&from, &liosam), 1),
+        (OrbSlam3::export(&from, &common()), 1),
     ];
-    for format in formats {
-        // FAST-LIO takes variances.
-        let power = if matches!(format, Format::FastLio(_)) {
-            2
-        } else {
-            1
-        };
-        let text = String::from_utf8(format.export(&from).unwrap().content).unwrap();
+    for (export, power) in exports {
+        let text = String::from_utf8(export.unwrap().content).unwrap();
         let mut found = 0;
         for line in text.lines().filter(|line| line.contains("_z: ")) {
             let (figure, comment) = line.split_once(" # ").unwrap();

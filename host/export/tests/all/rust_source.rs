@@ -6,7 +6,8 @@ use std::process::Command;
 use mimu::calibration::Calibration;
 use mimu_core::stored;
 use mimu_device::Image;
-use mimu_export::{Sources, rust};
+use mimu_export::rust::Rust;
+use mimu_export::{Nothing, Sources, Target};
 
 use crate::stream::{COUNTS, VOLTS, lines};
 use crate::unit::calibration_of;
@@ -27,7 +28,7 @@ fn crate_of(calibration: &Calibration) -> PathBuf {
         calibration: Some((calibration, "test")),
         ..Sources::default()
     };
-    let source = rust::export(&from).unwrap().content;
+    let source = Rust::export(&from, &Nothing {}).unwrap().content;
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("exported");
     std::fs::create_dir_all(folder.join("src")).unwrap();
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");

@@ -1,0 +1,167 @@
+//! What each format declares of itself, and the subcommand that this makes.
+
+use clap::error::ErrorKind;
+use clap::{ArgMatches, Args, Command, FromArgMatches, Subcommand};
+use mimu_recording::error::Result;
+
+use crate::convention::{Bias, Convention, Shape};
+use crate::{Export, FORMATS, Sources};
+
+/// Whether a format stores the noise of a unit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Noise {
+    /// It has no place for it.
+    No,
+    /// If it is given.
+    Optional,
+    /// It needs it.
+    Needed,
+    /// It stores nothing else: the program needs calibrated readings.
+    Only,
+}
+
+/// An entry of the page in a browser.
+#[derive(Debug, Clone, Copy)]
+pub struct Page {
+    /// What a person reads.
+    pub label: &'static str,
+    /// Name of the file.
+    pub file: &'static str,
+    /// Options after the name of the format, with spaces between them.
+    pub options: &'static str,
+}
+
+impl Page {
+    /// An entry without options.
+    pub const fn of(label: &'static str, file: &'static str) -> Self {
+        let options = "";
+        Self {
+            label,
+            file,
+            options,
+        }
+    }
+}
+
+/// A format: what it declares, and how its file is made. `--help`, the table in docs/export.md, and the lists of Python and the page follow from it.
+pub trait Target {
+    /// Its options on the command line.
+    type Options: Args + Clone + 'static;
+    /// Name in the command.
+    const NAME: &str;
+    /// The sentence of `--help`.
+    const ABOUT: &str;
+    /// What is in the file: its row in docs/export.md.
+    const CONTENTS: &str;
+    /// Who reads it: likewise.
+    const READERS: &str;
+    /// How it writes the model of a triad: unless it says otherwise C and o, as in the calibration file.
+    const CONVENTION: Convention = Convention::to_input(Shape::Whole, Bias::AddedToInput);
+    /// Whether it stores noise.
+    const NOISE: Noise = Noise::No;
+    /// Whether it can be written from biases over temperature alone.
+    const TAKES_BIASES: bool = false;
+    /// Its entries of the page.
+    const PAGES: &[Page] = &[];
+
+    /// The file.
+    ///
+    /// # Errors
+    /// A source is missing, or the format cannot store the calibration or the noise.
+    fn export(from: &Sources, options: &Self::Options) -> Result<Export>;
+}
+
+/// For formats without options.
+#[derive(Debug, Clone, Args)]
+pub struct Nothing {}
+
+type Make = dyn Fn(&Sources) -> Result<Export>;
+
+/// A [`Target`] among the others.
+pub struct Format {
+    /// Name in the command.
+    pub name: &'static str,
+    /// Whether it stores noise.
+    pub noise: Noise,
+    /// Whether it can be written from biases over temperature alone.
+    pub takes_biases: bool,
+    /// What is in the file, and who reads it.
+    pub row: [&'static str; 2],
+    /// Its entries of the page.
+    pub pages: &'static [Page],
+    about: &'static str,
+    augment: fn(Command) -> Command,
+    parse: fn(&ArgMatches) -> std::result::Result<Box<Make>, clap::Error>,
+}
+
+impl Format {
+    pub(crate) const fn of<T: Target>() -> Self {
+        Self {
+            name: T::NAME,
+            noise: T::NOISE,
+            takes_biases: T::TAKES_BIASES,
+            row: [T::CONTENTS, T::READERS],
+            pages: T::PAGES,
+            about: T::ABOUT,
+            augment: T::Options::augment_args,
+            parse: |matches| {
+                let options = T::Options::from_arg_matches(matches)?;
+                Ok(Box::new(move |from: &Sources| T::export(from, &options)))
+            },
+        }
+    }
+}
+
+/// A format that was chosen, with its options.
+pub struct Choice {
+    /// The format.
+    pub format: &'static Format,
+    make: Box<Make>,
+}
+
+impl Choice {
+    /// The file of this format.
+    ///
+    /// # Errors
+    /// Those of [`Target::export`], or noise and calibration belong to different readings.
+    pub fn export(&self, from: &Sources) -> Result<Export> {
+        from.check_same_readings()?;
+        (self.make)(from)
+    }
+}
+
+impl FromArgMatches for Choice {
+    fn from_arg_matches(matches: &ArgMatches) -> std::result::Result<Self, clap::Error> {
+        let chosen = matches.subcommand();
+        let chosen = chosen.and_then(|(n, of)| Some((FORMATS.iter().find(|f| f.name == n)?, of)));
+        let (format, of) = chosen.ok_or_else(|| clap::Error::new(ErrorKind::MissingSubcommand))?;
+        let make = (format.parse)(of)?;
+        Ok(Self { format, make })
+    }
+
+    fn update_from_arg_matches(
+        &mut self,
+        matches: &ArgMatches,
+    ) -> std::result::Result<(), clap::Error> {
+        *self = Self::from_arg_matches(matches)?;
+        Ok(())
+    }
+}
+
+impl Subcommand for Choice {
+    fn augment_subcommands(command: Command) -> Command {
+        let of = |f: &Format| {
+            let command = (f.augment)(Command::new(f.name));
+            command.about(f.about).long_about(None)
+        };
+        command.subcommands(FORMATS.iter().map(of))
+    }
+
+    fn augment_subcommands_for_update(command: Command) -> Command {
+        Self::augment_subcommands(command)
+    }
+
+    fn has_subcommand(name: &str) -> bool {
+        FORMATS.iter().any(|format| format.name == name)
+    }
+}
