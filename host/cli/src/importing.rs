@@ -8,7 +8,7 @@ use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::look::{Given, Look};
 use mimu_recording::{
     Chosen, Face, ImportOptions, ImportSummary, LogOptions, Preset, RawUnit, Reference,
-    SampleFormat, Scale, import, is_log,
+    SampleFormat, Scale, import, is_log, log_formats,
 };
 
 use crate::Cli;
@@ -17,9 +17,7 @@ use crate::output::{check_outputs, progress, quoted};
 
 #[derive(Args)]
 pub(crate) struct ImportArgs {
-    /// Text files (any separator), Parquet, bags of ROS 1 (.bag) and ROS 2 (.db3, .mcap), logs of PX4 (.ulg), of ArduPilot (.bin) and for Gyroflow (.gcsv), or the
-    /// folder of a preset; later files are interpolated at the times of the first
-    #[arg(required_unless_present = "faces")]
+    #[arg(required_unless_present = "faces", help = files_help())]
     files: Vec<PathBuf>,
     #[command(flatten)]
     log: LogOptions,
@@ -50,6 +48,13 @@ pub(crate) struct ImportArgs {
     output: PathBuf,
     #[command(flatten)]
     pub(crate) json: JsonArgs,
+}
+
+fn files_help() -> String {
+    format!(
+        "Text files (any separator), Parquet, logs of {}, or the folder of a preset; later files are interpolated at the times of the first",
+        log_formats()
+    )
 }
 
 /// Sample rates below this more likely mean a wrong unit of time.

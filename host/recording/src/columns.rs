@@ -59,6 +59,11 @@ impl Column {
     }
 }
 
+/// Whether `column` is one of the three raw columns of `sensor`, `gyro` or `accel`.
+pub(crate) fn of_sensor(sensor: &str, column: Column) -> bool {
+    matches!(column, Column::Raw(_)) && column.name().split('_').next() == Some(sensor)
+}
+
 /// Which of the optional columns a recording has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Columns {

@@ -39,9 +39,7 @@ pub(super) fn while_hashing<T>(
         drop(guard);
         match digest.join() {
             Ok(hex) => Ok((done, hex?)),
-            Err(_) => Err(super::in_order::reader_panicked(
-                &path.display().to_string(),
-            )),
+            Err(_) => Err(super::ahead::reader_panicked(&path.display().to_string())),
         }
     })
 }

@@ -84,7 +84,8 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::manifest::{Manifest, RawUnit, Reference};
+    use crate::declared::{RawUnit, Reference};
+    use crate::manifest::Manifest;
     use crate::reader::Recording;
     use crate::writer::{SampleFormat, Writer};
 

@@ -14,29 +14,27 @@ pub mod signed_low_byte;
 pub mod statistics;
 pub mod units;
 
+mod ahead;
 mod batch;
 mod cell;
 mod clock;
 mod columns;
 mod csv_file;
 mod csv_writer;
+mod declared;
 mod digest;
 mod growing;
 mod import;
 mod in_memory;
-mod in_order;
 mod manifest;
 mod parents;
 #[cfg(feature = "parquet")]
 mod parquet_file;
 #[cfg(feature = "parquet")]
 mod parquet_writer;
-mod raw_channels;
 mod reader;
 mod recorded;
 mod reference_error;
-#[cfg(all(test, feature = "parquet"))]
-mod round_trip_tests;
 mod separator;
 mod staging;
 #[cfg(feature = "parquet")]
@@ -59,17 +57,17 @@ use without_parquet as parquet_writer;
 pub use batch::Batch;
 pub use clock::{ClockRate, REFUSED_SHARE, REPORTED_SHARE, Times};
 pub use columns::{Column, Columns, RAW_COLUMNS, REFERENCE_COLUMNS};
+pub use declared::{Rails, RawUnit, Reference, WholeTurns};
 pub use growing::Growing;
 pub use import::{
     BrokenKind, BrokenLimit, BrokenRows, Chosen, ColumnList, CommentSigns, CopiedTable, Decimal,
-    Face, ImportOptions, ImportSummary, Inputs, Jitter, LogOptions, Offset, PoseMean, PoseMeans,
-    Preset, PresetUse, Preview, ReadingUnits, Role, Rounds, RowFilter, RowRange, Scale,
-    SkippedLines, TimeSummary, TwosComplement, Zero, import, is_log, labelled, look, preview,
+    Face, ImportOptions, ImportSummary, Inputs, Jitter, LogOptions, Offset, PerColumn, PoseMean,
+    PoseMeans, Preset, PresetUse, Preview, ReadingUnits, Role, Rounds, RowFilter, RowRange, Scale,
+    SkippedLines, TimeSummary, TwosComplement, Zero, import, is_log, labelled, log_formats, look,
+    preview,
 };
 pub use in_memory::{InMemory, usual_rate_hz};
-pub use manifest::{
-    Format, MANIFEST_FILE, Manifest, Rails, RawUnit, Reference, Source, WholeTurns,
-};
+pub use manifest::{Format, MANIFEST_FILE, Manifest, Source};
 pub use parents::Parents;
 pub use reader::{ReadSummary, Recording};
 pub use recorded::{Recorded, Restart, SensorSetting, SensorSettings};

@@ -1,7 +1,4 @@
-//! `samples.parquet`: decoded by several threads, each with some of the columns, slice by slice.
-//!
-//! The work is divided by columns, not by row groups. Files of other programs are often one big row group, which could not be divided at all. With a
-//! thread for each row group, the memory would grow with the row group, whose size its writer chose.
+//! `samples.parquet`, decoded slice by slice while the slice before is used.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
@@ -9,15 +6,16 @@ use std::sync::Arc;
 
 use parquet::basic::{ConvertedType, LogicalType, Repetition, Type as Physical};
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl, get_column_reader};
-use parquet::data_type::{ByteArray, DataType};
+use parquet::data_type::DataType;
 use parquet::errors::ParquetError;
 use parquet::file::metadata::{ParquetMetaData, ParquetMetaDataReader};
 use parquet::file::serialized_reader::SerializedPageReader;
 
+use super::ahead::{ahead, reader_panicked};
 use super::batch::Batch;
 use super::cell::{self, Refusal, shorten};
 use super::columns::{Column, Layout};
-use super::in_order::{in_order, reader_panicked, worker_count};
+use super::csv_writer::write_number;
 use super::strict_file::StrictFile;
 use crate::error::{Error, Result};
 
@@ -43,8 +41,6 @@ pub(super) struct ParquetFile {
 pub(super) struct Leaf {
     index: usize,
     unsigned: bool,
-    /// INT64 with a sign.
-    long: bool,
     text: bool,
 }
 
@@ -104,46 +100,33 @@ impl ParquetFile {
     pub fn leaf(&self, name: &str) -> Result<Leaf> {
         let schema = self.metadata.file_metadata().schema_descr();
         let place = format!("{}, column {name}", self.path.display());
-        let not_flat = || {
-            let problem = "the column is nested or repeated";
-            Error::new(&place, problem, "write it as one number in each row")
+        let of_name = |index: &usize| {
+            schema
+                .column(*index)
+                .path()
+                .parts()
+                .first()
+                .is_some_and(|part| part == name)
         };
-        let (index, column) = (0..schema.num_columns())
-            .map(|index| (index, schema.column(index)))
-            .find(|(_, column)| {
-                column
-                    .path()
-                    .parts()
-                    .first()
-                    .is_some_and(|part| part == name)
-            })
-            .ok_or_else(|| Error::new(&place, "the column is missing", "check the name"))?;
+        let index = (0..schema.num_columns()).find(of_name);
+        let missing = || Error::new(&place, "the column is missing", "check the name");
+        let index = index.ok_or_else(missing)?;
+        let column = schema.column(index);
         let info = column.self_type().get_basic_info();
         let repeated = info.has_repetition() && info.repetition() == Repetition::REPEATED;
         if column.path().parts().len() != 1 || repeated {
-            return Err(not_flat());
+            let problem = "the column is nested or repeated";
+            let remedy = "write it as one number in each row";
+            return Err(Error::new(&place, problem, remedy));
         }
         let logical = column.logical_type_ref();
-        let converted = column.converted_type();
+        let converted = column.converted_type().to_string();
         let plain = match logical {
-            None => converted == ConvertedType::NONE,
+            None => column.converted_type() == ConvertedType::NONE,
             Some(kind) => matches!(kind, LogicalType::Integer { .. } | LogicalType::Unknown),
         };
-        let unsigned = matches!(
-            converted,
-            ConvertedType::UINT_8
-                | ConvertedType::UINT_16
-                | ConvertedType::UINT_32
-                | ConvertedType::UINT_64
-        );
-        let integer = unsigned
-            || matches!(
-                converted,
-                ConvertedType::INT_8
-                    | ConvertedType::INT_16
-                    | ConvertedType::INT_32
-                    | ConvertedType::INT_64
-            );
+        let unsigned = converted.starts_with("UINT_");
+        let integer = unsigned || converted.starts_with("INT_");
         let text = column.physical_type() == Physical::BYTE_ARRAY;
         let number = match column.physical_type() {
             Physical::DOUBLE | Physical::FLOAT => true,
@@ -166,7 +149,6 @@ impl ParquetFile {
         Ok(Leaf {
             index,
             unsigned,
-            long: !unsigned && column.physical_type() == Physical::INT64,
             text,
         })
     }
@@ -182,70 +164,27 @@ impl ParquetFile {
         mut consume: impl FnMut(&Batch) -> Result<()>,
     ) -> Result<u64> {
         let place = self.path.display().to_string();
-        let names = self.names();
-        let mut wanted = Vec::new();
-        for (slot, name) in layout.slots.iter().zip(&names) {
+        let mut cursors = Vec::new();
+        for (slot, name) in layout.slots.iter().zip(&self.names()) {
             if let Some(column) = *slot {
-                wanted.push((column, self.leaf(name)?));
+                cursors.push((column, Cursor::new(self, self.leaf(name)?)));
             }
         }
-        let workers = worker_count().min(wanted.len()).max(1);
-        let slices = self.rows.div_ceil(slice as u64);
-        let mut batch = Batch::default();
-        let mut fault: Option<Fault> = None;
-        in_order(
-            &place,
-            slices * workers as u64,
-            workers,
-            |worker| {
-                // Distributed in turn, so that neighbours, which cost the same, go to different threads.
-                let mine = wanted.iter().skip(worker).step_by(workers);
-                let mut cursors: Vec<(Column, Cursor)> = mine
-                    .map(|&(column, leaf)| (column, Cursor::new(self, leaf)))
-                    .collect();
-                move |index| {
-                    let first = index / workers as u64 * slice as u64;
-                    let count = (self.rows - first).min(slice as u64) as usize;
-                    let decode = |(column, cursor): &mut (Column, Cursor)| {
-                        Ok((*column, decode_slice(*column, cursor, first, count)?))
-                    };
-                    cursors.iter_mut().map(decode).collect()
-                }
-            },
-            |index, part: std::result::Result<Vec<(Column, Decoded)>, Fault>| {
-                match part {
-                    Err(worse) => {
-                        // If several columns fail in this slice, the earliest row is reported.
-                        if fault.as_ref().is_none_or(|known| worse.row < known.row) {
-                            fault = Some(worse);
-                        }
-                    }
-                    Ok(part) => {
-                        for (column, decoded) in part {
-                            match decoded {
-                                Decoded::Steps(steps) => batch.step = steps,
-                                Decoded::Values(values) => {
-                                    if let Some(target) = batch.values_mut(column) {
-                                        *target = values;
-                                    }
-                                }
-                            }
-                        }
-                    }
-                }
-                if !(index + 1).is_multiple_of(workers as u64) {
-                    return Ok(());
-                }
-                if let Some(fault) = fault.take() {
-                    return Err(fault.at(&place));
-                }
-                consume(&batch)?;
-                batch.first_row += batch.len() as u64;
-                progress((index + 1) as f64 / (slices * workers as u64) as f64);
-                Ok(())
-            },
-        )?;
-        Ok(self.rows)
+        let (rows, mut first) = (self.rows, 0);
+        let next = || {
+            (first < rows).then(|| {
+                let count = (rows - first).min(slice as u64) as usize;
+                first += count as u64;
+                decode(&mut cursors, first - count as u64, count)
+            })
+        };
+        ahead(&place, next, |batch| {
+            let batch: Batch = batch.map_err(|fault: Fault| fault.at(&place))?;
+            consume(&batch)?;
+            progress((batch.first_row + batch.len() as u64) as f64 / rows as f64);
+            Ok(())
+        })?;
+        Ok(rows)
     }
 
     /// One column, steps as numbers; the bytes of the others are not read.
@@ -288,6 +227,34 @@ enum Decoded {
     Steps(Vec<i32>),
 }
 
+/// A slice of some columns. If several fail, the earliest row is reported.
+fn decode(
+    cursors: &mut [(Column, Cursor)],
+    first: u64,
+    count: usize,
+) -> std::result::Result<Batch, Fault> {
+    let mut batch = Batch {
+        first_row: first,
+        ..Batch::default()
+    };
+    let mut fault: Option<Fault> = None;
+    for (column, cursor) in cursors {
+        match decode_slice(*column, cursor, first, count) {
+            Ok(Decoded::Steps(steps)) => batch.step = steps,
+            Ok(Decoded::Values(values)) => {
+                if let Some(target) = batch.values_mut(*column) {
+                    *target = values;
+                }
+            }
+            Err(worse) if fault.as_ref().is_none_or(|known| worse.row < known.row) => {
+                fault = Some(worse);
+            }
+            Err(_) => {}
+        }
+    }
+    fault.map_or(Ok(batch), Err)
+}
+
 fn decode_slice(
     column: Column,
     cursor: &mut Cursor,
@@ -323,6 +290,14 @@ fn decode_slice(
     Ok(Decoded::Values(values))
 }
 
+/// A stored value.
+enum Value<'a> {
+    Float(f64),
+    Whole(i64),
+    Unsigned(u64),
+    Text(&'a [u8]),
+}
+
 /// Reads one column from front to back, across its row groups.
 pub(super) struct Cursor {
     source: ParquetFile,
@@ -350,84 +325,77 @@ impl Cursor {
         }
     }
 
-    /// Appends the next `count` values, NaN for null.
+    /// Appends the next `count` numbers, NaN for null.
     pub fn read(&mut self, count: usize, values: &mut Vec<f64>) -> std::result::Result<(), String> {
         values.reserve(count);
-        let unsigned = self.leaf.unsigned;
-        self.advance(count, |reader, levels, count| match reader {
-            ColumnReader::DoubleColumnReader(reader) => {
-                let start = values.len();
-                let (rows, _, _) = reader.read_records(count, Some(levels), None, values)?;
-                spread(values, start, rows, levels, f64::NAN);
-                Ok(rows)
-            }
-            ColumnReader::FloatColumnReader(reader) => {
-                append(reader, count, levels, values, f64::from)
-            }
-            ColumnReader::Int32ColumnReader(reader) => {
-                append(reader, count, levels, values, |value| match unsigned {
-                    true => f64::from(value.cast_unsigned()),
-                    false => f64::from(value),
-                })
-            }
+        self.read_as(count, (values, f64::NAN), |value| match value {
+            Value::Float(value) => value,
             // Beyond 2^53 the nearest double is used: no sensor resolves more.
-            ColumnReader::Int64ColumnReader(reader) => {
-                append(reader, count, levels, values, |value| match unsigned {
-                    true => value.cast_unsigned() as f64,
-                    false => value as f64,
-                })
+            Value::Whole(value) => value as f64,
+            Value::Unsigned(value) => value as f64,
+            Value::Text(_) => f64::NAN,
+        })
+    }
+
+    /// Appends the next `count` values as text, empty for null. Numbers read back exactly.
+    pub fn read_cells(
+        &mut self,
+        count: usize,
+        cells: &mut Vec<Vec<u8>>,
+    ) -> std::result::Result<(), String> {
+        self.read_as(count, (cells, Vec::new()), |value| match value {
+            Value::Float(value) => {
+                let mut text = Vec::new();
+                write_number(value, &mut text);
+                text
             }
-            _ => Err(ParquetError::General(
-                "the column does not contain numbers".into(),
-            )),
+            Value::Whole(value) => value.to_string().into_bytes(),
+            Value::Unsigned(value) => value.to_string().into_bytes(),
+            Value::Text(text) => text.to_vec(),
         })
     }
 
-    /// Appends the next `count` values. A column of signed INT64 is also appended to `wholes` without rounding, `None` for null.
-    pub fn read_whole(
+    /// Appends the next `count` values as `of` converts them, with `null` for each null.
+    fn read_as<V: Clone>(
         &mut self,
         count: usize,
-        values: &mut Vec<f64>,
-        wholes: &mut Vec<Option<i64>>,
+        (values, null): (&mut Vec<V>, V),
+        of: impl Fn(Value<'_>) -> V,
     ) -> std::result::Result<(), String> {
-        if !self.leaf.long {
-            return self.read(count, values);
-        }
+        use ColumnReader as Reader;
+        let unsigned = self.leaf.unsigned;
         self.advance(count, |reader, levels, count| {
-            let ColumnReader::Int64ColumnReader(reader) = reader else {
-                return Err(ParquetError::General(
-                    "the column does not contain INT64".into(),
-                ));
-            };
-            let (start, mut stored) = (wholes.len(), Vec::with_capacity(count));
-            let (rows, _, _) = reader.read_records(count, Some(levels), None, &mut stored)?;
-            wholes.extend(stored.into_iter().map(Some));
-            spread(wholes, start, rows, levels, None);
-            values.extend(
-                wholes[start..]
-                    .iter()
-                    .map(|v| v.map_or(f64::NAN, |v| v as f64)),
-            );
-            Ok(rows)
-        })
-    }
-
-    /// Appends the next `count` texts, empty for null.
-    pub fn read_text(
-        &mut self,
-        count: usize,
-        texts: &mut Vec<ByteArray>,
-    ) -> std::result::Result<(), String> {
-        self.advance(count, |reader, levels, count| {
-            let ColumnReader::ByteArrayColumnReader(reader) = reader else {
-                return Err(ParquetError::General(
-                    "the column does not contain text".into(),
-                ));
-            };
-            let start = texts.len();
-            let (rows, _, _) = reader.read_records(count, Some(levels), None, texts)?;
-            spread(texts, start, rows, levels, ByteArray::from(Vec::new()));
-            Ok(rows)
+            let into = (&mut *values, null.clone());
+            match reader {
+                Reader::DoubleColumnReader(reader) => {
+                    append(reader, count, levels, into, |v| of(Value::Float(v)))
+                }
+                Reader::FloatColumnReader(reader) => {
+                    append(reader, count, levels, into, |v| of(Value::Float(v.into())))
+                }
+                Reader::Int32ColumnReader(reader) if unsigned => {
+                    append(reader, count, levels, into, |v| {
+                        of(Value::Unsigned(v.cast_unsigned().into()))
+                    })
+                }
+                Reader::Int32ColumnReader(reader) => {
+                    append(reader, count, levels, into, |v| of(Value::Whole(v.into())))
+                }
+                Reader::Int64ColumnReader(reader) if unsigned => {
+                    append(reader, count, levels, into, |v| {
+                        of(Value::Unsigned(v.cast_unsigned()))
+                    })
+                }
+                Reader::Int64ColumnReader(reader) => {
+                    append(reader, count, levels, into, |v| of(Value::Whole(v)))
+                }
+                Reader::ByteArrayColumnReader(reader) => {
+                    append(reader, count, levels, into, |v| of(Value::Text(v.data())))
+                }
+                _ => Err(ParquetError::General(
+                    "the column contains neither numbers nor text".into(),
+                )),
+            }
         })
     }
 
@@ -483,19 +451,19 @@ impl Cursor {
     }
 }
 
-/// Appends rows whose values `number` turns into doubles.
-fn append<T: DataType>(
+/// Appends rows whose values `of` converts, with `null` for each null.
+fn append<T: DataType, V: Clone>(
     reader: &mut ColumnReaderImpl<T>,
     count: usize,
     levels: &mut Vec<i16>,
-    values: &mut Vec<f64>,
-    number: impl Fn(T::T) -> f64,
+    (values, null): (&mut Vec<V>, V),
+    of: impl Fn(T::T) -> V,
 ) -> parquet::errors::Result<usize> {
     let start = values.len();
     let mut stored = Vec::with_capacity(count);
     let (rows, _, _) = reader.read_records(count, Some(levels), None, &mut stored)?;
-    values.extend(stored.into_iter().map(number));
-    spread(values, start, rows, levels, f64::NAN);
+    values.extend(stored.into_iter().map(of));
+    spread(values, start, rows, levels, null);
     Ok(rows)
 }
 

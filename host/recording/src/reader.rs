@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::batch::Batch;
 use super::columns::{Column, Columns, Layout};
-use super::csv_file::{CHUNK, CsvFile};
+use super::csv_file::{CsvFile, PIECE};
 use super::digest;
 use super::in_memory::{self, InMemory};
 use super::manifest::{MANIFEST_FILE, Manifest};
@@ -101,7 +101,7 @@ impl Recording {
             (true, false) => {
                 let mut file = CsvFile::open(&csv)?;
                 if manifest.unfinished {
-                    let cut = file.leave_out_cut_row()? > 0;
+                    let cut = file.leave_out_cut_row()?;
                     warnings.push(Warning::Unfinished {
                         folder: directory.to_owned(),
                         cut,
@@ -193,7 +193,7 @@ impl Recording {
         }
     }
 
-    /// Hands all rows to `consume`, in order and on this thread, while other threads read and parse the next ones; `progress` receives the share that
+    /// Hands all rows to `consume`, in order and on this thread, while another reads the next ones; `progress` receives the share that
     /// is done, up to 1.
     ///
     /// An error is about the first bad row. Rows of a CSV file are numbered like lines in an editor, from 1 with the header. An error of `consume`
@@ -203,7 +203,7 @@ impl Recording {
         progress: impl Fn(f64),
         consume: impl FnMut(&Batch) -> Result<()>,
     ) -> Result<ReadSummary> {
-        self.in_pieces(CHUNK, SLICE, progress, consume)
+        self.in_pieces(PIECE, SLICE, progress, consume)
     }
 
     /// Whether one column can be read without the others; only in CSV it cannot.
@@ -244,7 +244,7 @@ impl Recording {
             }
         }
         let mut all: Vec<Vec<f64>> = vec![Vec::new(); columns.len()];
-        self.in_written_pieces(CHUNK, SLICE, progress, |batch| {
+        self.in_written_pieces(PIECE, SLICE, progress, |batch| {
             for (values, column) in all.iter_mut().zip(columns) {
                 match batch.values(*column) {
                     Some(more) => values.extend_from_slice(more),
@@ -256,18 +256,18 @@ impl Recording {
         Ok(all)
     }
 
-    /// [`Recording::for_each_batch`] with pieces of a chosen size: bytes of CSV, rows of Parquet.
+    /// [`Recording::for_each_batch`] with pieces of a chosen size, in rows of CSV and of Parquet.
     pub(super) fn in_pieces(
         &self,
-        chunk: u64,
+        piece: usize,
         slice: usize,
         progress: impl Fn(f64),
         mut consume: impl FnMut(&Batch) -> Result<()>,
     ) -> Result<ReadSummary> {
         let Some(factor) = self.clock_factor else {
-            return self.in_written_pieces(chunk, slice, progress, consume);
+            return self.in_written_pieces(piece, slice, progress, consume);
         };
-        self.in_written_pieces(chunk, slice, progress, |batch| {
+        self.in_written_pieces(piece, slice, progress, |batch| {
             let mut batch = batch.clone();
             batch.t_s.iter_mut().for_each(|t| *t /= factor);
             consume(&batch)
@@ -276,14 +276,14 @@ impl Recording {
 
     fn in_written_pieces(
         &self,
-        chunk: u64,
+        piece: usize,
         slice: usize,
         progress: impl Fn(f64),
         consume: impl FnMut(&Batch) -> Result<()>,
     ) -> Result<ReadSummary> {
         let (rows, sha256) = match &self.source {
             Samples::Csv(file) => digest::while_hashing(&self.samples, || {
-                file.for_each_batch(chunk, progress, consume)
+                file.for_each_batch(piece, progress, consume)
             }),
             Samples::Parquet(file, layout) => digest::while_hashing(&self.samples, || {
                 file.for_each_batch(layout, slice, progress, consume)

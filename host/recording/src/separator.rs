@@ -31,15 +31,22 @@ pub struct Characters(u128);
 
 impl Characters {
     /// Those of `text`; `None` if one is not a printable sign of ASCII, is a letter, a digit or part of a number, or if there is none.
-    fn of(text: &str) -> Option<Self> {
+    pub(crate) fn of(text: &str) -> Option<Self> {
         let fits = |b: &u8| (b.is_ascii_punctuation() && !b"+-.\"".contains(b)) || *b == b' ';
         let bits = text.bytes().map(|b| fits(&b).then(|| 1_u128 << b));
         let all = bits.reduce(|a, b| Some(a? | b?))??;
         Some(Self(all))
     }
 
-    fn contains(self, byte: u8) -> bool {
+    pub(crate) fn contains(self, byte: u8) -> bool {
         byte.is_ascii() && self.0 >> byte & 1 == 1
+    }
+}
+
+impl fmt::Display for Characters {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let all = (0..128_u8).filter(|byte| self.contains(*byte));
+        f.write_str(&all.map(char::from).collect::<String>())
     }
 }
 
@@ -179,10 +186,7 @@ impl Serialize for Separator {
 impl fmt::Display for Separator {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Separator::AnyOf(characters) => {
-                let all = (0..128_u8).filter(|byte| characters.contains(*byte));
-                return f.write_str(&all.map(char::from).collect::<String>());
-            }
+            Separator::AnyOf(characters) => return characters.fmt(f),
             Separator::Comma => "comma",
             Separator::Semicolon => "semicolon",
             Separator::Tab => "tab",

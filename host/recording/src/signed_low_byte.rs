@@ -1,8 +1,8 @@
 //! Readings of two bytes whose low byte a firmware took for a signed number: `(high << 8) + (int8_t)low`.
 
-use crate::columns::Column;
+use crate::cell::shorten;
+use crate::columns::{Column, of_sensor};
 use crate::error::{Error, Result};
-use crate::raw_channels::RawChannels;
 
 /// Number of values of a byte.
 const BYTE: f64 = 256.0;
@@ -23,14 +23,14 @@ pub fn corrected(reading: f64) -> f64 {
     }
 }
 
-/// Raw channels that an import corrects.
+/// Raw channels that an import corrects: `gyro`, `accel` or a single one.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct SignedLowByte(RawChannels);
+pub struct SignedLowByte(String);
 
 impl SignedLowByte {
     /// Whether `column` has this fault.
     pub(crate) fn applies_to(&self, column: Column) -> bool {
-        self.0.have(column)
+        column.name() == self.0 || of_sensor(&self.0, column)
     }
 }
 
@@ -38,17 +38,22 @@ impl std::str::FromStr for SignedLowByte {
     type Err = Error;
 
     fn from_str(text: &str) -> Result<Self> {
-        let channels = RawChannels::named(text).map_err(|problem| {
-            let remedy = "write gyro, accel or a single column such as gyro_x";
-            Error::new("signed low byte", problem, remedy)
-        })?;
-        Ok(Self(channels))
+        let channels = Self(text.to_owned());
+        let raw = (0..6).map(Column::Raw);
+        match raw.into_iter().any(|column| channels.applies_to(column)) {
+            true => Ok(channels),
+            false => Err(Error::new(
+                "signed low byte",
+                format!("{} is not a raw column", shorten(text.as_bytes())),
+                "write gyro, accel or a single column such as gyro_x",
+            )),
+        }
     }
 }
 
 impl std::fmt::Display for SignedLowByte {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        self.0.fmt(f)
+        f.write_str(&self.0)
     }
 }
 

@@ -1,5 +1,8 @@
 //! What the tests of this crate share.
 
+#[cfg(feature = "parquet")]
+mod round_trip;
+
 /// Checks that `text` contains all these words.
 #[track_caller]
 pub fn says(text: &str, words: &[&str]) {

@@ -402,9 +402,10 @@ impl<'a> Factors<'a> {
                 let by = ClosureError::by_increments(&self.turns[own.clone()], gyro);
                 Some((own, vec![by.unwrap_or_default().concat()]))
             }
-            Kind::Magnitude { .. } | Kind::Input { .. } | Kind::Stated(..) | Kind::Population(..) => {
-                None
-            }
+            Kind::Magnitude { .. }
+            | Kind::Input { .. }
+            | Kind::Stated(..)
+            | Kind::Population(..) => None,
         }
     }
 

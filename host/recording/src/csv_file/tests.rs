@@ -11,8 +11,8 @@ use crate::tests::says;
 const MANIFEST: &str = "format = \"mimu-recording/1\"\ndevice = \"d\"\nsample_rate_hz = 10\n\
     gravity_mps2 = 9.8\nraw_unit = \"V\"\nreference = \"table\"\n";
 
-/// Reads `text` as samples.csv in chunks of `chunk` bytes; all rows in one batch.
-fn read(text: &[u8], chunk: u64) -> Result<(Batch, ReadSummary)> {
+/// Reads `text` as samples.csv, `piece` rows at a time; all rows in one batch.
+fn read(text: &[u8], piece: usize) -> Result<(Batch, ReadSummary)> {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("recording.toml"), MANIFEST).unwrap();
     std::fs::write(folder.path().join("samples.csv"), text).unwrap();
@@ -20,7 +20,7 @@ fn read(text: &[u8], chunk: u64) -> Result<(Batch, ReadSummary)> {
     let mut all = Batch::default();
     let last = RefCell::new(0.0);
     let summary = recording.in_pieces(
-        chunk,
+        piece,
         1,
         |share| assert!(share >= last.replace(share) && share <= 1.0),
         |batch| {
@@ -44,9 +44,9 @@ fn read(text: &[u8], chunk: u64) -> Result<(Batch, ReadSummary)> {
 
 fn refused(text: &str) -> String {
     let whole = read(text.as_bytes(), 1 << 20).unwrap_err().to_string();
-    // Wherever the chunks are cut, the message is about the first bad row.
-    for chunk in [1, 7, 64] {
-        let cut = read(text.as_bytes(), chunk).unwrap_err().to_string();
+    // However many rows are handed on at a time, the message is about the first bad row.
+    for piece in [1, 7, 64] {
+        let cut = read(text.as_bytes(), piece).unwrap_err().to_string();
         let tail = |message: &str| message.split("samples.csv").nth(1).map(str::to_owned);
         assert_eq!(tail(&cut), tail(&whole));
     }
@@ -62,13 +62,13 @@ fn table(rows: u32) -> String {
 }
 
 #[test]
-fn chunk_borders_neither_lose_nor_double_a_row() {
+fn pieces_neither_lose_nor_double_a_row() {
     let text = table(300);
     let (whole, summary) = read(text.as_bytes(), 1 << 20).unwrap();
     assert_eq!(whole.len(), 300);
-    for chunk in (1..60).chain([100, 1000, text.len() as u64 - 1]) {
-        let (cut, cut_summary) = read(text.as_bytes(), chunk).unwrap();
-        assert_eq!(cut.t_s, whole.t_s, "chunks of {chunk} bytes");
+    for piece in [1, 2, 7, 100, 299, 300, 301] {
+        let (cut, cut_summary) = read(text.as_bytes(), piece).unwrap();
+        assert_eq!(cut.t_s, whole.t_s, "pieces of {piece} rows");
         assert_eq!(cut.step, whole.step);
         assert_eq!(cut.raw, whole.raw);
         assert_eq!(cut_summary, summary);
@@ -92,8 +92,8 @@ fn line_endings_quotes_byte_order_marks_and_blank_lines_change_nothing() {
         plain.replace(',', " , "),
     ];
     for text in variants {
-        for chunk in [3, 1 << 20] {
-            let (batch, _) = read(text.as_bytes(), chunk).unwrap();
+        for piece in [3, 1 << 20] {
+            let (batch, _) = read(text.as_bytes(), piece).unwrap();
             assert_eq!(batch.t_s, expected.t_s, "{text}");
             assert_eq!(batch.raw, expected.raw);
         }
@@ -190,7 +190,7 @@ fn files_without_rows_are_refused() {
         (HEADER.trim_end(), "no row"),
         ("\n\n\n", "t_s"),
         ("t_s,t_s,gyro_x,gyro_y,gyro_z\n0,0,0,0,0\n", "twice"),
-        ("PAR1\0\0\0", "not text"),
+        ("PAR1\0\0\0", "Parquet"),
     ] {
         let error = read(text.as_bytes(), 10).unwrap_err().to_string();
         assert!(error.contains(word), "{error}");
@@ -207,8 +207,8 @@ fn files_without_rows_are_refused() {
 #[test]
 fn a_line_without_end_is_refused_with_its_row() {
     let text = format!("{}{}", table(3), "1,".repeat(1 << 20));
-    for chunk in [1000, 1 << 20] {
-        let error = read(text.as_bytes(), chunk).unwrap_err().to_string();
+    for piece in [1000, 1 << 20] {
+        let error = read(text.as_bytes(), piece).unwrap_err().to_string();
         assert!(error.contains("row 5"), "{error}");
     }
     let error = read("x".repeat(2 << 20).as_bytes(), 100).unwrap_err();
@@ -229,7 +229,7 @@ proptest! {
     #[test]
     fn near_misses_never_panic_and_never_lose_a_row(
         text in "([0-9.,\"nae\r-]{0,12}\n){0,20}",
-        chunk in 1_u64..50,
+        chunk in 1_usize..50,
     ) {
         let text = format!("t_s,gyro_x,gyro_y,gyro_z\n{text}");
         let whole = read(text.as_bytes(), 1 << 20).map(|(batch, _)| batch.len());
@@ -238,7 +238,7 @@ proptest! {
     }
 
     #[test]
-    fn values_come_back_as_they_were_written(values in prop::collection::vec(any::<f64>(), 1..50), chunk in 1_u64..200) {
+    fn values_come_back_as_they_were_written(values in prop::collection::vec(any::<f64>(), 1..50), chunk in 1_usize..200) {
         let finite: Vec<f64> = values.into_iter().map(|v| if v.abs() > 1e30 { 0.0 } else { v }).collect();
         let mut text = "t_s,gyro_x,gyro_y,gyro_z\n".to_owned();
         for value in &finite {

@@ -3,21 +3,30 @@
 //! `IMU` contains the readings of sensor number `I` at the rate of the main loop or below, `GYR` and `ACC` those at the sensor's own rate. All are
 //! calibrated and rotated to the vehicle's axes: `R ((raw - INS_ACCOFFS) INS_ACCSCAL)` and `R (raw - INS_GYROFFS)`, with R given by
 //! `AHRS_ORIENTATION` (`_rotate_and_correct_accel` of AP_InertialSensor_Backend). Before version 3.3, whose logs count ms (`TimeMS`), the readings were
-//! calibrated on the vehicle's axes: `INS_ACCSCAL (R raw) - INS_ACCOFFS` (`_rotate_and_offset_accel`). `IMT` contains the same readings, integrated over an interval.
+//! calibrated on the vehicle's axes: `INS_ACCSCAL (R raw) - INS_ACCOFFS` (`_rotate_and_offset_accel`).
 
 mod records;
 
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::readings::{Choice, Readings};
+use super::decimal::Decimal;
+use super::readings::{Choice, LogFormat, Readings};
 use super::rotation::{Correction, listed, orientation};
 use crate::columns::Column;
 use crate::error::{Argument, Error, Result};
 use records::{Record, Records};
 
-/// Messages that are read. [`Log::chosen`] prefers `GYR` with `ACC`, then `IMU`, then `IMT`.
-const MESSAGES: [&str; 4] = ["IMU", "GYR", "ACC", "IMT"];
+/// Logs of ArduPilot.
+pub(super) const BIN: LogFormat = LogFormat {
+    name: "ArduPilot",
+    ending: "bin",
+    unit: Decimal::Microsecond,
+    read,
+};
+
+/// Messages that are read. [`Log::chosen`] prefers `GYR` with `ACC`, then `IMU`.
+const MESSAGES: [&str; 3] = ["IMU", "GYR", "ACC"];
 
 /// Readings of one sensor in messages of one kind.
 #[derive(Default)]
@@ -43,7 +52,7 @@ struct Log {
 }
 
 /// Reads a log.
-pub(super) fn read(path: &Path, choice: Choice<'_>) -> Result<Vec<Readings>> {
+fn read(path: &Path, choice: Choice<'_>) -> Result<Vec<Readings>> {
     let bytes = std::fs::read(path).map_err(|error| Error::io(path, &error))?;
     let mut records = Records::new(&bytes);
     let mut log = Log::default();
@@ -120,45 +129,19 @@ impl Log {
     }
 
     fn chosen(&self, path: &Path, choice: Choice<'_>) -> Result<Vec<Readings>> {
-        let refuse = |problem: String, remedy: &str| {
-            let error = Error::new(path.display(), problem, remedy);
-            Err(error.about(Argument::Topic).about(Argument::Instance))
-        };
         let of_instance = |instance: u32| -> Vec<&'static str> {
             let kinds = self.samples.keys().filter(|(_, i)| *i == instance);
             kinds.map(|(kind, _)| *kind).collect()
         };
-        let mut instances: Vec<u32> = self.samples.keys().map(|(_, i)| *i).collect();
-        instances.sort_unstable();
-        instances.dedup();
-        let instance = match (choice.instance, instances.as_slice()) {
-            (None, [only]) => *only,
-            (Some(wanted), all) if all.contains(&wanted) => wanted,
-            (Some(wanted), _) => {
-                let problem = format!(
-                    "the log has no instance {wanted}; it has: {}",
-                    self.listed()
-                );
-                return refuse(problem, "choose one of these");
-            }
-            (None, []) => {
-                let problem = format!("the log has {}", self.listed());
-                return refuse(problem, "log them: LOG_BITMASK with IMU");
-            }
-            (None, _) => {
-                let problem = format!("the log has several sensors: {}", self.listed());
-                return refuse(problem, "choose one of the instances");
-            }
-        };
+        let instances = self.samples.keys().map(|(_, instance)| *instance);
+        let instance = choice.instance_of(path, instances, &self.listed())?;
         let there = of_instance(instance);
         let both_fast = there.contains(&"GYR") && there.contains(&"ACC");
         let topic = choice.topic_of(path, &[&["GYR", "ACC"]])?;
         let kinds: &[&str] = match topic {
             None if both_fast => &["GYR", "ACC"],
             Some("GYR" | "ACC") => &["GYR", "ACC"],
-            None if there.contains(&"IMU") => &["IMU"],
-            Some("IMU") => &["IMU"],
-            None | Some("IMT") => &["IMT"],
+            None | Some("IMU") => &["IMU"],
             Some(_) => &[],
         };
         let mut found: Vec<(&str, &Samples)> = kinds
@@ -171,7 +154,8 @@ impl Log {
                 "the log has no {what} of instance {instance}; it has: {}",
                 self.listed()
             );
-            return refuse(problem, "choose one of these");
+            let error = Error::new(path.display(), problem, "choose one of these");
+            return Err(error.about(Argument::Topic).about(Argument::Instance));
         }
         // The others are interpolated at the times of the first.
         found.sort_by_key(|(_, samples)| std::cmp::Reverse(samples.stamps_ns.len()));
@@ -216,16 +200,6 @@ impl Samples {
         let (gyro, accel) = match kind {
             "GYR" => (Some(three(["GyrX", "GyrY", "GyrZ"])?), None),
             "ACC" => (None, Some(three(["AccX", "AccY", "AccZ"])?)),
-            "IMT" => {
-                let per = |interval: &str, names| {
-                    let interval = record.number(interval).filter(|seconds| *seconds > 0.0)?;
-                    Some(three(names)?.map(|gathered| gathered / interval))
-                };
-                (
-                    Some(per("DelaT", ["DelAX", "DelAY", "DelAZ"])?),
-                    Some(per("DelvT", ["DelVX", "DelVY", "DelVZ"])?),
-                )
-            }
             _ => (
                 Some(three(["GyrX", "GyrY", "GyrZ"])?),
                 Some(three(["AccX", "AccY", "AccZ"])?),

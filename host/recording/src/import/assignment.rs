@@ -1,4 +1,4 @@
-//! What the columns of a foreign file become, with which factors and offsets.
+//! What the columns of a foreign file become.
 
 use std::fmt;
 use std::str::FromStr;
@@ -156,143 +156,6 @@ impl fmt::Display for ColumnList {
     }
 }
 
-/// A factor for a column, or for the three columns of a sensor, as in `gyro=57.2958`.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Scale {
-    /// `gyro`, `accel` or the name of a column.
-    target: String,
-    factor: f64,
-}
-
-impl Scale {
-    /// Whether `column` is to be multiplied.
-    fn applies_to(&self, column: Column) -> bool {
-        let name = column.name();
-        match self.target.as_str() {
-            "gyro" | "accel" => {
-                matches!(column, Column::Raw(_)) && name.starts_with(self.target.as_str())
-            }
-            target => name == target,
-        }
-    }
-
-    /// Whether it holds for readings of a sensor, not only for the time or the temperature.
-    pub fn is_of_readings(&self) -> bool {
-        Column::all().any(|column| matches!(column, Column::Raw(_)) && self.applies_to(column))
-    }
-
-    /// The scales of those columns for which `by_hand` has none. If it has some axes of a sensor, the scale is kept for the others.
-    pub(super) fn beside(scales: &[Scale], by_hand: &[Scale]) -> Vec<Scale> {
-        let free = |column: &Column| Self::given(by_hand, *column).is_none();
-        let mut beside = Vec::new();
-        for scale in scales {
-            let columns: Vec<Column> = Column::all().filter(|c| scale.applies_to(*c)).collect();
-            match columns.iter().all(free) {
-                true => beside.push(scale.clone()),
-                false => beside.extend(columns.into_iter().filter(free).map(|column| Scale {
-                    target: column.name().to_owned(),
-                    factor: scale.factor,
-                })),
-            }
-        }
-        beside
-    }
-
-    /// Product of the factors for `column`, if there are any.
-    pub(super) fn given(scales: &[Scale], column: Column) -> Option<f64> {
-        let any = scales.iter().any(|scale| scale.applies_to(column));
-        any.then(|| Self::product(scales, column))
-    }
-
-    /// Product of the factors that apply to `column`.
-    pub(super) fn product(scales: &[Scale], column: Column) -> f64 {
-        let applicable = scales.iter().filter(|scale| scale.applies_to(column));
-        applicable.map(|scale| scale.factor).product()
-    }
-}
-
-impl FromStr for Scale {
-    type Err = Error;
-
-    fn from_str(text: &str) -> Result<Self> {
-        let refuse = |problem: String, remedy: &str| Err(Error::new("scale", problem, remedy));
-        let shown = shorten(text.as_bytes());
-        let Some((target, factor)) = text.split_once('=') else {
-            return refuse(
-                format!("{shown} has no factor"),
-                "write it like gyro=57.2958",
-            );
-        };
-        let target = target.trim();
-        let known = Column::from_name(target).is_some_and(|column| column != Column::Step);
-        if !known && target != "gyro" && target != "accel" {
-            return refuse(
-                format!("{shown} does not name a column of numbers"),
-                "scale gyro, accel, temp_c, t_s or a single column such as gyro_x",
-            );
-        }
-        match factor.trim().parse::<f64>() {
-            Ok(factor) if factor.is_finite() && factor != 0.0 => Ok(Scale {
-                target: target.to_owned(),
-                factor,
-            }),
-            _ => refuse(
-                format!("{shown} has no finite factor other than 0"),
-                "write it like gyro=57.2958",
-            ),
-        }
-    }
-}
-
-impl fmt::Display for Scale {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}={}", self.target, self.factor)
-    }
-}
-
-/// What is added to a column after its factor, as in `temp_c=36.53`.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Offset {
-    column: Column,
-    value: f64,
-}
-
-impl Offset {
-    /// Sum of the offsets of `column`.
-    pub(super) fn sum(offsets: &[Offset], column: Column) -> f64 {
-        let own = offsets.iter().filter(|offset| offset.column == column);
-        own.map(|offset| offset.value).sum()
-    }
-}
-
-impl FromStr for Offset {
-    type Err = Error;
-
-    fn from_str(text: &str) -> Result<Self> {
-        let parts = text.split_once('=');
-        let column = parts.and_then(|(name, _)| Column::from_name(name.trim()));
-        let column = column.filter(|column| !matches!(column, Column::Time | Column::Step));
-        let value = parts.and_then(|(_, value)| value.trim().parse::<f64>().ok());
-        match (column, value.filter(|value| value.is_finite())) {
-            (Some(column), Some(value)) => Ok(Offset { column, value }),
-            _ => Err(Error::new(
-                "offset",
-                format!(
-                    "{} is not a column of numbers with an offset",
-                    shorten(text.as_bytes())
-                ),
-                "write it like temp_c=36.53, one column at a time",
-            )),
-        }
-    }
-}
-
-impl fmt::Display for Offset {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}={}", self.column.name(), self.value)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -319,21 +182,6 @@ mod tests {
         ] {
             let error = text.parse::<ColumnList>().unwrap_err().to_string();
             assert!(error.contains(word), "{error}");
-        }
-    }
-
-    #[test]
-    fn factors_multiply_and_reach_the_axes_of_their_sensor_only() {
-        let scales: Vec<Scale> = ["gyro=2", "gyro_x=3", "t_s=0.001"]
-            .iter()
-            .map(|text| text.parse().unwrap())
-            .collect();
-        assert_eq!(Scale::product(&scales, Column::Raw(0)), 6.0);
-        assert_eq!(Scale::product(&scales, Column::Raw(1)), 2.0);
-        assert_eq!(Scale::product(&scales, Column::Raw(3)), 1.0);
-        assert_eq!(Scale::product(&scales, Column::Time), 0.001);
-        for text in ["gyro", "gyro=x", "gyro=0", "mag=1", "step=2", "gyro=inf"] {
-            assert!(text.parse::<Scale>().is_err(), "{text}");
         }
     }
 }

@@ -126,7 +126,7 @@ impl fmt::Display for BrokenKind {
 
 /// Why a row cannot be read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Fault {
+pub(crate) enum Fault {
     Width,
     /// The last row lacks its end: the card was pulled out, or the supply failed. It is left out without being asked.
     Truncated,
@@ -151,14 +151,14 @@ impl Fault {
 
 /// What keeps a row from being read: its own fault, or one of the file.
 #[derive(Debug)]
-pub(super) enum Unreadable {
+pub(crate) enum Unreadable {
     Row(BrokenRow),
     File(Error),
 }
 
 /// A row that cannot be read.
 #[derive(Debug)]
-pub(super) struct BrokenRow {
+pub(crate) struct BrokenRow {
     number: u64,
     fault: Fault,
     error: Error,

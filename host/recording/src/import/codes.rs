@@ -1,97 +1,7 @@
 //! From a cell of a file to a reading: first the converter's code, then the factor and the offset.
 
-use std::fmt;
-use std::str::FromStr;
-
-use crate::cell::{Refusal, is_reading, shorten};
-use crate::columns::Column;
-use crate::error::{Error, Result};
-use crate::raw_channels::RawChannels;
+use crate::cell::{Refusal, is_reading};
 use crate::signed_low_byte::corrected;
-
-/// Raw columns of unsigned codes in two's complement, as in `accel=12`: the upper half of the codes are negative readings.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct TwosComplement {
-    channels: RawChannels,
-    bits: u32,
-}
-
-impl TwosComplement {
-    /// Bits of `column`, if its codes are in two's complement.
-    pub(super) fn bits(all: &[TwosComplement], column: Column) -> Option<u32> {
-        let own = all.iter().find(|codes| codes.channels.have(column));
-        own.map(|codes| codes.bits)
-    }
-}
-
-impl FromStr for TwosComplement {
-    type Err = Error;
-
-    fn from_str(text: &str) -> Result<Self> {
-        let parts = text.split_once('=');
-        let channels = parts.and_then(|(name, _)| RawChannels::named(name.trim()).ok());
-        let bits = parts.and_then(|(_, bits)| bits.trim().parse::<u32>().ok());
-        match (channels, bits.filter(|bits| (2..=32).contains(bits))) {
-            (Some(channels), Some(bits)) => Ok(Self { channels, bits }),
-            _ => Err(Error::new(
-                "two's complement",
-                format!(
-                    "{} is not a raw column with 2 to 32 bits",
-                    shorten(text.as_bytes())
-                ),
-                "write it like accel=12, for gyro, accel or a single column such as gyro_x",
-            )),
-        }
-    }
-}
-
-impl fmt::Display for TwosComplement {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}={}", self.channels, self.bits)
-    }
-}
-
-/// The code that raw columns have at an input of 0, as in `gyro=2048`: subtracted before the factor.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Zero {
-    channels: RawChannels,
-    code: f64,
-}
-
-impl Zero {
-    /// Code of `column` at an input of 0.
-    pub(super) fn of(all: &[Zero], column: Column) -> f64 {
-        let own = all.iter().filter(|zero| zero.channels.have(column));
-        own.map(|zero| zero.code).sum()
-    }
-}
-
-impl FromStr for Zero {
-    type Err = Error;
-
-    fn from_str(text: &str) -> Result<Self> {
-        let parts = text.split_once('=');
-        let channels = parts.and_then(|(name, _)| RawChannels::named(name.trim()).ok());
-        let code = parts.and_then(|(_, code)| code.trim().parse::<f64>().ok());
-        match (channels, code.filter(|code| code.is_finite())) {
-            (Some(channels), Some(code)) => Ok(Self { channels, code }),
-            _ => Err(Error::new(
-                "zero",
-                format!(
-                    "{} is not a raw column with a code",
-                    shorten(text.as_bytes())
-                ),
-                "write it like gyro=2048, for gyro, accel or a single column such as gyro_x",
-            )),
-        }
-    }
-}
-
-impl fmt::Display for Zero {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}={}", self.channels, self.code)
-    }
-}
 
 /// Conversion of the cells of a column, in the order of the fields.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -183,22 +93,5 @@ mod tests {
             offset: 7.0,
         };
         assert_eq!(conversion.reading(2050.0).ok(), Some(8.0));
-        let zeros: Vec<Zero> = ["gyro=512", "accel_z=-3"]
-            .map(|text| text.parse().unwrap())
-            .into();
-        let of = |c| Zero::of(&zeros, Column::Raw(c));
-        assert_eq!([of(1), of(4), of(5)], [512.0, 0.0, -3.0]);
-    }
-
-    #[test]
-    fn what_names_no_channels_or_no_number_is_refused() {
-        for text in ["12", "accel", "accel=1", "accel=33", "temp_c=12", "accel=x"] {
-            assert!(text.parse::<TwosComplement>().is_err(), "{text}");
-        }
-        for text in ["12", "gyro", "gyro=inf", "t_s=1", "gyro=x"] {
-            assert!(text.parse::<Zero>().is_err(), "{text}");
-        }
-        let both: TwosComplement = "gyro=16".parse().unwrap();
-        assert_eq!(both.to_string(), "gyro=16");
     }
 }

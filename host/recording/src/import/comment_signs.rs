@@ -5,23 +5,26 @@ use std::str::FromStr;
 
 use crate::cell::shorten;
 use crate::error::{Error, Result};
-use crate::separator::Separator;
+use crate::separator::{Characters, Separator};
 
 /// Characters of which any, at the beginning of a line, makes the line a comment. By default `#` and `%`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct CommentSigns(u128);
+pub struct CommentSigns(Option<Characters>);
 
 impl Default for CommentSigns {
     fn default() -> Self {
-        Self(1 << b'#' | 1 << b'%')
+        Self(Characters::of("#%"))
     }
 }
 
 impl CommentSigns {
+    /// No character begins a comment.
+    pub(crate) const NONE: Self = Self(None);
+
     /// The sign by which `line` is a comment, after blanks.
     pub(super) fn begins(self, line: &[u8]) -> Option<u8> {
         let first = *line.trim_ascii().first()?;
-        (first.is_ascii() && self.0 >> first & 1 == 1).then_some(first)
+        self.0?.contains(first).then_some(first)
     }
 
     /// The line after blanks and signs of a comment: names may follow them.
@@ -36,13 +39,10 @@ impl FromStr for CommentSigns {
     type Err = Error;
 
     fn from_str(text: &str) -> Result<Self> {
-        if text == "none" {
-            return Ok(Self(0));
-        }
-        let sign = |b: &u8| b.is_ascii_punctuation() && !b"+-.".contains(b);
-        match !text.is_empty() && text.bytes().all(|b| sign(&b)) {
-            true => Ok(Self(text.bytes().fold(0, |all, b| all | 1 << b))),
-            false => Err(Error::new(
+        match (text, Characters::of(text)) {
+            ("none", _) => Ok(Self::NONE),
+            (_, Some(signs)) => Ok(Self(Some(signs))),
+            (_, None) => Err(Error::new(
                 "signs of comments",
                 format!("{} does not begin a comment", shorten(text.as_bytes())),
                 "write the characters that begin a comment line, such as '#;', or none",
@@ -53,17 +53,16 @@ impl FromStr for CommentSigns {
 
 impl fmt::Display for CommentSigns {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let all: String = (0..128_u8)
-            .filter(|b| self.0 >> b & 1 == 1)
-            .map(char::from)
-            .collect();
-        f.write_str(if all.is_empty() { "none" } else { &all })
+        match self.0 {
+            Some(signs) => signs.fmt(f),
+            None => f.write_str("none"),
+        }
     }
 }
 
 /// What is given about the lines of a text file.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct TextFormat {
+pub(crate) struct TextFormat {
     /// Separator of cells; detected if `None`.
     pub separator: Option<Separator>,
     pub comments: CommentSigns,

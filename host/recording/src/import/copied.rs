@@ -48,7 +48,7 @@ impl CopiedTable {
         if import.interpolates() {
             return refuse("its times are irregular, so its rows are interpolated");
         }
-        let Some(names) = import.first.names() else {
+        let Some(table) = import.first.text() else {
             return refuse("only text is copied");
         };
         let name = |(k, (name, column)): (usize, (String, Option<Column>))| match column {
@@ -57,7 +57,8 @@ impl CopiedTable {
             None if name.is_empty() => format!("column_{}", k + 1),
             _ => name,
         };
-        let names: Vec<String> = names.into_iter().enumerate().map(name).collect();
+        let names = table.header.all_names().into_iter().enumerate().map(name);
+        let names: Vec<String> = names.collect();
         let mut csv = csv::Writer::from_writer(Vec::new());
         csv.write_record(&names)
             .map_err(|e| Error::new(path.display(), e, "copy it elsewhere"))?;
@@ -85,8 +86,8 @@ impl CopiedTable {
         if !file.next(&mut row)? {
             return Err(ended());
         }
-        let cells = file.cells().ok_or_else(ended)?;
-        let replaced = cells.map(|(cell, column)| match column {
+        let table = file.text().ok_or_else(ended)?;
+        let replaced = table.all_cells().map(|(cell, column)| match column {
             Some(Column::Raw(c)) if self.replaced[c / 3] => {
                 let mut text = Vec::new();
                 write_number(readings[c], &mut text);

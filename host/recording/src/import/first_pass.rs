@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use super::assignment::Scale;
 use super::foreign::{ForeignFile, HowToRead};
 use super::log::{self, is_log};
+use super::per_column::Scale;
 use super::row::Row;
 use super::row_limit::{MOST_ROWS, too_many_rows};
 use super::time::{Known, Stamps, Times};
@@ -25,7 +25,7 @@ pub(super) fn times(
     let stamps = read(path, &mut file)?;
     let (name, counter) = (file.time_name(), file.counts_samples());
     let known = Known {
-        factor: match file.has_calendar_times() {
+        factor: match file.noticed().calendar {
             true => Some(1.0),
             false => how.time_factor(path),
         },
@@ -79,6 +79,8 @@ impl HowToRead<'_> {
             .log
             .time_unit
             .map(|unit| 1.0 / unit.per_second() as f64);
-        unit.or(Scale::given(&self.log.scale, Column::Time)).or(own)
+        let mut scales = Scale::given(&self.log.scale, Column::Time).peekable();
+        let scaled = scales.peek().is_some().then(|| scales.product());
+        unit.or(scaled).or(own)
     }
 }

@@ -2,21 +2,21 @@
 
 use std::path::{Path, PathBuf};
 
-use super::SkippedLines;
-use super::assignment::{ColumnList, Offset, Role, Scale};
+use super::assignment::{ColumnList, Role};
 use super::broken::{BrokenTally, Fault, Unreadable};
-use super::codes::{Conversion, TwosComplement, Zero};
+use super::codes::Conversion;
 use super::counter::{Counter, StampCounter};
 use super::log::{self, is_log};
 use super::log_options::LogOptions;
-use super::parquet_table::ParquetTable;
+use super::noticed::Noticed;
+use super::per_column::{Offset, Scale, TwosComplement, Zero};
 use super::plausibility::Plausibility;
 use super::readings::Readings;
 use super::row::Row;
 use super::row_filter::RowFilter;
 use super::row_range::RowRange;
 use super::step_labels::StepLabels;
-use super::text_table::{Cells, TextTable};
+use super::table::{self, Cells};
 use super::time::{Clock, Stamp, Times};
 use crate::cell::{is_reading, no_reading, no_time};
 use crate::columns::Column;
@@ -47,11 +47,13 @@ impl HowToRead<'_> {
     fn conversion(&self, column: Column) -> Conversion {
         let log = self.log;
         Conversion {
-            twos_complement: TwosComplement::bits(&log.twos_complement, column),
+            twos_complement: TwosComplement::given(&log.twos_complement, column)
+                .next()
+                .map(|bits| bits as u32),
             signed_low_byte: log.signed_low_byte.iter().any(|s| s.applies_to(column)),
-            zero: Zero::of(&log.zero, column),
-            factor: Scale::product(&log.scale, column),
-            offset: Offset::sum(&log.offset, column),
+            zero: Zero::given(&log.zero, column).sum(),
+            factor: Scale::given(&log.scale, column).product(),
+            offset: Offset::given(&log.offset, column).sum(),
         }
     }
 }
@@ -60,11 +62,11 @@ impl HowToRead<'_> {
 #[derive(Debug)]
 pub(super) struct ForeignFile {
     path: PathBuf,
-    table: Table,
+    source: Rows,
     /// Number of parts: a log has several if its sensors have separate clocks.
     pub parts: usize,
     cells: Cells,
-    source: TimeSource,
+    time: TimeSource,
     counter: Counter,
     stamps: StampCounter,
     /// The times of its rows, once they are known.
@@ -85,10 +87,9 @@ pub(super) struct ForeignFile {
 }
 
 #[derive(Debug)]
-enum Table {
-    Text(Box<TextTable>),
-    Parquet(ParquetTable),
-    Log(Readings),
+enum Rows {
+    Table(Box<table::Table>),
+    Log(Readings, Noticed),
 }
 
 /// A cell that becomes a value of a row.
@@ -129,7 +130,7 @@ fn fits_log(path: &Path, how: &HowToRead<'_>) -> Result<()> {
 }
 
 /// Refuses columns that a recording of samples cannot take.
-fn check_roles(path: &Path, parquet: bool, roles: &[Role]) -> Result<()> {
+fn check_roles(path: &Path, roles: &[Role]) -> Result<()> {
     let of_means = |role: &&Role| matches!(role, Role::Deviation(_) | Role::Averaged(_));
     if let Some(role) = roles.iter().find(of_means) {
         return Err(Error::new(
@@ -141,11 +142,6 @@ fn check_roles(path: &Path, parquet: bool, roles: &[Role]) -> Result<()> {
             "skip the column, or import the file as a table of means",
         )
         .about(Argument::Means));
-    }
-    if parquet && roles.contains(&Role::Nanoseconds) {
-        let problem = "nanoseconds beside seconds are read from text only";
-        let remedy = "give a column with the whole time, or convert the file to text";
-        return Err(Error::new(path.display(), problem, remedy).about(Argument::Columns));
     }
     Ok(())
 }
@@ -173,33 +169,32 @@ fn time_source(path: &Path, how: &HowToRead<'_>, roles: &[Role]) -> Result<TimeS
 impl ForeignFile {
     /// Opens `path` and finds its columns.
     pub fn open(path: &Path, how: &HowToRead<'_>) -> Result<ForeignFile> {
-        let parquet = path
-            .extension()
-            .is_some_and(|e| e.eq_ignore_ascii_case("parquet"));
-        let mut parts = 1;
         fits_log(path, how)?;
-        let table = match parquet {
-            _ if is_log(path) => {
+        let (source, parts) = match is_log(path) {
+            true => {
                 let mut all = log::read(path, how.log.choice())?;
-                parts = all.len();
-                Table::Log(all.swap_remove(how.part))
+                let parts = all.len();
+                let mut readings = all.swap_remove(how.part);
+                let noticed = Noticed {
+                    notes: std::mem::take(&mut readings.notes),
+                    warnings: std::mem::take(&mut readings.warnings),
+                    ..Noticed::default()
+                };
+                (Rows::Log(readings, noticed), parts)
             }
-            true => Table::Parquet(ParquetTable::open(path, how.list, &how.filters)?),
-            false => Table::Text(Box::new(TextTable::open(
-                path,
-                how.list,
-                how.log.text_format(),
-                &how.filters,
-            )?)),
+            false => {
+                let format = how.log.text_format();
+                let table = table::Table::open(path, how.list, format, &how.filters)?;
+                (Rows::Table(Box::new(table)), 1)
+            }
         };
-        let roles = match &table {
-            Table::Text(table) => table.roles(),
-            Table::Parquet(table) => table.roles(),
-            Table::Log(readings) => readings.roles(),
+        let roles = match &source {
+            Rows::Table(table) => table.header.roles(),
+            Rows::Log(readings, _) => readings.roles(),
         };
-        check_roles(path, parquet, &roles)?;
+        check_roles(path, &roles)?;
         let at = |role| roles.iter().position(|&other| other == role);
-        let source = time_source(path, how, &roles)?;
+        let time = time_source(path, how, &roles)?;
         let numbers = roles
             .iter()
             .enumerate()
@@ -223,10 +218,10 @@ impl ForeignFile {
             empty_zero_temperatures: how.empty_zero_temperatures,
             skip_empty: how.skip_empty,
             has_step: at(Role::Column(Column::Step)).is_some(),
-            table,
+            source,
             parts,
             cells: Cells::default(),
-            source,
+            time,
             counter: Counter::default(),
             stamps: StampCounter::default(),
             clock: None,
@@ -250,7 +245,7 @@ impl ForeignFile {
 
     /// Rows a second; not a number before its times are known.
     pub fn rate_hz(&self) -> f64 {
-        match (&self.clock, self.source) {
+        match (&self.clock, self.time) {
             (Some(clock), _) => clock.times().summary.rate_hz,
             (None, TimeSource::Rows(rate)) => rate,
             (None, TimeSource::Stamp | TimeSource::Sample(_)) => f64::NAN,
@@ -264,26 +259,32 @@ impl ForeignFile {
 
     /// Whether the file has time stamps or a sample counter.
     pub fn has_time(&self) -> bool {
-        matches!(self.source, TimeSource::Stamp | TimeSource::Sample(_))
+        matches!(self.time, TimeSource::Stamp | TimeSource::Sample(_))
     }
 
     /// Whether its stamps are those of a sample counter, as given.
     pub fn counts_samples(&self) -> bool {
-        matches!(self.source, TimeSource::Sample(_))
+        matches!(self.time, TimeSource::Sample(_))
     }
 
     /// Name of the column with the time stamps in the file, if it has names.
     pub fn time_name(&self) -> Option<String> {
-        match &self.table {
-            Table::Text(table) => table.time_name(),
-            Table::Parquet(table) => table.time_name(),
-            Table::Log(_) => None,
+        self.table()?.header.time_name()
+    }
+
+    fn table(&self) -> Option<&table::Table> {
+        match &self.source {
+            Rows::Table(table) => Some(table),
+            Rows::Log(..) => None,
         }
     }
 
-    /// Whether its times so far are dates or times of day.
-    pub fn has_calendar_times(&self) -> bool {
-        matches!(&self.table, Table::Text(table) if table.calendar)
+    /// What was noticed beside its rows so far.
+    pub fn noticed(&self) -> &Noticed {
+        match &self.source {
+            Rows::Table(table) => &table.noticed,
+            Rows::Log(_, noticed) => noticed,
+        }
     }
 
     /// Sets the times of the rows; no row has been read yet.
@@ -292,71 +293,16 @@ impl ForeignFile {
         self
     }
 
-    /// Lines so far that contained no row.
-    pub fn skipped(&self) -> SkippedLines {
-        match &self.table {
-            Table::Text(table) => table.skipped,
-            Table::Parquet(_) | Table::Log(_) => SkippedLines::default(),
-        }
-    }
-
     /// Rows so far that the filters chose, and those that they or the range left out.
     pub fn chosen(&self) -> [u64; 2] {
-        let [chosen, left_out] = match &self.table {
-            Table::Text(table) => table.filters().counts(),
-            Table::Parquet(table) => table.filters.counts(),
-            Table::Log(_) => [0; 2],
-        };
+        let counts = self.table().map(|table| table.header.filters.counts());
+        let [chosen, left_out] = counts.unwrap_or_default();
         [chosen, left_out + self.outside]
     }
 
-    /// Name and column of each cell of a row of text.
-    pub fn names(&self) -> Option<Vec<(String, Option<Column>)>> {
-        match &self.table {
-            Table::Text(table) => Some(table.all_names()),
-            Table::Parquet(_) | Table::Log(_) => None,
-        }
-    }
-
-    /// The cells of the last row of text as they are written, with their columns.
-    pub fn cells(&self) -> Option<impl Iterator<Item = (&[u8], Option<Column>)>> {
-        match &self.table {
-            Table::Text(table) => Some(table.all_cells()),
-            Table::Parquet(_) | Table::Log(_) => None,
-        }
-    }
-
-    /// Lines of words among its rows so far, and the first of them.
-    pub fn restarts(&self) -> Option<(u64, u64)> {
-        match &self.table {
-            Table::Text(table) => table.restarts,
-            Table::Parquet(_) | Table::Log(_) => None,
-        }
-    }
-
-    /// Zero bytes around its lines so far.
-    pub fn zero_bytes(&self) -> u64 {
-        match &self.table {
-            Table::Text(table) => table.zero_bytes,
-            Table::Parquet(_) | Table::Log(_) => 0,
-        }
-    }
-
-    /// Warnings about what was ignored.
-    pub fn warnings(&self) -> &[String] {
-        match &self.table {
-            Table::Text(table) => &table.warnings,
-            Table::Parquet(table) => &table.warnings,
-            Table::Log(readings) => &readings.warnings,
-        }
-    }
-
-    /// What was read from a log, and how its readings were changed.
-    pub fn notes(&self) -> &[String] {
-        match &self.table {
-            Table::Log(readings) => &readings.notes,
-            Table::Text(_) | Table::Parquet(_) => &[],
-        }
+    /// The table, if it is text, whose cells can be copied as they are written.
+    pub fn text(&self) -> Option<&table::Table> {
+        self.table().filter(|table| table.is_text())
     }
 
     /// How often its sample counter has wrapped so far.
@@ -371,10 +317,9 @@ impl ForeignFile {
 
     /// Share of the file that has been read.
     pub fn progress(&self) -> f64 {
-        match &self.table {
-            Table::Text(table) => table.progress(),
-            Table::Parquet(table) => table.progress(),
-            Table::Log(readings) => readings.progress(),
+        match &self.source {
+            Rows::Table(table) => table.progress(),
+            Rows::Log(readings, _) => readings.progress(),
         }
     }
 
@@ -399,10 +344,8 @@ impl ForeignFile {
                 Ok(true) => self.broken.rows += 1,
                 Ok(false) => {
                     self.broken.check()?;
-                    match &self.table {
-                        Table::Text(table) => table.check_filters()?,
-                        Table::Parquet(table) => table.filters.check(&self.path)?,
-                        Table::Log(_) => {}
+                    if let Some(table) = self.table() {
+                        table.header.filters.check(&self.path)?;
                     }
                     return Ok(false);
                 }
@@ -441,20 +384,19 @@ impl ForeignFile {
     }
 
     fn read(&mut self, row: &mut Row) -> std::result::Result<bool, Unreadable> {
-        let restarts = self.restarts();
-        let number = match &mut self.table {
-            Table::Text(table) => table.next(&mut self.cells)?,
-            Table::Parquet(table) => table.next(&mut self.cells)?,
-            Table::Log(readings) => readings.next(&mut self.cells),
+        let restarts = self.noticed().restarts;
+        let number = match &mut self.source {
+            Rows::Table(table) => table.next(&mut self.cells)?,
+            Rows::Log(readings, _) => readings.next(&mut self.cells),
         };
         let Some(number) = number else {
             return Ok(false);
         };
-        if self.restarts() != restarts {
+        if self.noticed().restarts != restarts {
             self.stamps.restart();
         }
         let at = |path: &Path| format!("{}, row {number}", path.display());
-        let time = match self.source {
+        let time = match self.time {
             TimeSource::Stamp => self.cells.stamp.value,
             TimeSource::Sample(cell) => self.cells.numbers[cell],
             // A broken row was a sample too, and took its time.
@@ -494,11 +436,11 @@ impl ForeignFile {
             })?;
         }
         row.number = number;
-        row.stamp = match self.source {
+        row.stamp = match self.time {
             TimeSource::Sample(_) => Stamp::from(self.counter.next(time)),
             TimeSource::Stamp | TimeSource::Rows(_) => self.cells.stamp,
         };
-        row.t_s = match self.source {
+        row.t_s = match self.time {
             TimeSource::Stamp | TimeSource::Sample(_) => 0.0,
             TimeSource::Rows(_) => time,
         };

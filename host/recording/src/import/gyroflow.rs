@@ -11,7 +11,8 @@ use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 
-use super::readings::{Choice, Readings};
+use super::decimal::Decimal;
+use super::readings::{Choice, LogFormat, Readings};
 use crate::columns::Column;
 use crate::error::{Argument, Error, Result};
 
@@ -24,8 +25,16 @@ const GRAVITY: f64 = 9.80665;
 /// Columns after the time. The accelerometer may be missing.
 const NAMES: [&str; 6] = ["gx", "gy", "gz", "ax", "ay", "az"];
 
+/// Logs of Gyroflow.
+pub(super) const GCSV: LogFormat = LogFormat {
+    name: "Gyroflow",
+    ending: "gcsv",
+    unit: Decimal::Microsecond,
+    read,
+};
+
 /// Reads a log.
-pub(super) fn read(path: &Path, choice: Choice<'_>) -> Result<Vec<Readings>> {
+fn read(path: &Path, choice: Choice<'_>) -> Result<Vec<Readings>> {
     if choice.topics.is_empty() && choice.instance.is_none() {
         let file = File::open(path).map_err(|error| Error::io(path, &error))?;
         return Ok(vec![Log::read(path, BufReader::new(file))?]);

@@ -3,18 +3,30 @@
 use std::collections::{BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 
+use super::broken::Unreadable;
+use super::comment_signs::CommentSigns;
 use super::faces::Face;
+use super::head::{self, LineFormat};
+use super::lines::{LONGEST_LINE, Lines};
+use super::noticed::Noticed;
 use super::step_labels::StepLabels;
 use crate::cell::{self, shorten};
 use crate::columns::REFERENCE_COLUMNS;
-use crate::csv_file::BOM;
 use crate::error::{Error, Result};
+use crate::separator::Separator;
 
 /// Angle turned during a whole step, in degrees.
 const TURN_COLUMNS: [&str; 3] = ["turn_x_deg", "turn_y_deg", "turn_z_deg"];
 
-/// Longest table of inputs in bytes; one row a step does not fill a hundredth of it.
-const LONGEST: u64 = 64 << 20;
+/// A column of the table.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Slot {
+    Step,
+    /// An input, by its place among [`REFERENCE_COLUMNS`].
+    Input(usize),
+    /// An angle, by its place among [`TURN_COLUMNS`].
+    Turn(usize),
+}
 
 /// Known inputs by step.
 ///
@@ -40,81 +52,54 @@ struct Step {
     used: bool,
 }
 
+impl Step {
+    fn new(row: u64, input: [f64; 6]) -> Self {
+        Self {
+            row,
+            input,
+            turn_deg: [f64::NAN; 3],
+            used: false,
+        }
+    }
+}
+
 impl Inputs {
-    /// Reads the table at `path`.
-    pub fn read(path: &Path) -> Result<Inputs> {
-        let io = |error: std::io::Error| Error::io(path, &error);
-        if std::fs::metadata(path).map_err(io)?.len() > LONGEST {
-            let problem = "this is too long for a table with one row for each dwell";
-            return Err(Error::new(
-                path.display(),
-                problem,
-                "give the table of inputs, not the samples",
-            ));
-        }
-        let bytes = std::fs::read(path).map_err(io)?;
-        super::binary::refuse_binary(path, &bytes[..bytes.len().min(4096)])?;
-        Self::parse(&bytes, path)
-    }
-
-    /// Inputs of steps that are labelled with the face that is up.
-    pub(super) fn of_faces(faces: &[Face], gravity_mps2: f64) -> Inputs {
-        let step = |(row, face): (u64, &Face)| {
-            let step = Step {
-                row,
-                input: face.inputs(gravity_mps2),
-                turn_deg: [f64::NAN; 3],
-                used: false,
-            };
-            (face.to_string(), step)
-        };
+    fn new(path: &Path) -> Inputs {
         Inputs {
-            path: PathBuf::from("faces"),
-            columns: [false, false, false, true, true, true],
-            has_turns: false,
-            turns: BTreeSet::new(),
-            steps: (1..).zip(faces).map(step).collect(),
-        }
-    }
-
-    fn parse(bytes: &[u8], path: &Path) -> Result<Inputs> {
-        let at = |row: u64| format!("{}, row {row}", path.display());
-        let mut reader = csv::ReaderBuilder::new()
-            .has_headers(false)
-            .flexible(true)
-            .comment(Some(b'#'))
-            .trim(csv::Trim::All)
-            .from_reader(bytes.strip_prefix(BOM).unwrap_or(bytes));
-        let mut record = csv::ByteRecord::new();
-        let mut names: Vec<String> = Vec::new();
-        let mut inputs = Inputs {
             path: path.to_owned(),
             columns: [false; 6],
             has_turns: false,
             turns: BTreeSet::new(),
             steps: HashMap::new(),
+        }
+    }
+
+    /// Reads the table at `path`.
+    pub fn read(path: &Path) -> Result<Inputs> {
+        let format = LineFormat {
+            separator: Separator::Comma,
+            comments: CommentSigns::default(),
         };
-        while reader
-            .read_byte_record(&mut record)
-            .map_err(|error| Error::new(path.display(), error, "correct the file"))?
+        let opened = head::open(path, LONGEST_LINE)?;
+        let mut lines = Lines::new(path, format, None, opened, 1)?;
+        let (mut record, mut noticed) = (csv::ByteRecord::new(), Noticed::default());
+        let mut slots: Vec<Slot> = Vec::new();
+        let mut inputs = Inputs::new(path);
+        while let Some((row, _)) = lines
+            .next(&mut record, &mut noticed)
+            .map_err(Unreadable::into_error)?
         {
-            let row = record.position().map_or(1, csv::Position::line);
-            if names.is_empty() {
-                names = inputs.header(&record, &at(row))?;
+            let place = format!("{}, row {row}", path.display());
+            if slots.is_empty() {
+                slots = inputs.header(&record, &place)?;
                 continue;
             }
-            if record.iter().all(<[u8]>::is_empty) {
-                continue;
+            let (cells, expected) = (record.len(), slots.len());
+            if cells != expected {
+                let problem = format!("the row has {cells} cells, the header {expected}");
+                return Err(Error::new(place, problem, "correct the row"));
             }
-            if record.len() != names.len() {
-                let problem = format!(
-                    "the row has {} cells, the header {}",
-                    record.len(),
-                    names.len()
-                );
-                return Err(Error::new(at(row), problem, "correct the row"));
-            }
-            inputs.step(&record, &names, row)?;
+            inputs.step(&record, &slots, row)?;
         }
         if inputs.steps.is_empty() {
             let remedy = "write a header with the column step, and one row for each dwell";
@@ -123,69 +108,71 @@ impl Inputs {
         Ok(inputs)
     }
 
-    fn header(&mut self, record: &csv::ByteRecord, place: &str) -> Result<Vec<String>> {
-        let names: Vec<String> = record
-            .iter()
-            .map(|name| String::from_utf8_lossy(name).into_owned())
-            .collect();
-        for (i, name) in names.iter().enumerate() {
+    /// Inputs of steps that are labelled with the face that is up.
+    pub(super) fn of_faces(faces: &[Face], gravity_mps2: f64) -> Inputs {
+        let steps = (1..).zip(faces);
+        let step = |(row, face): (u64, &Face)| {
+            (face.to_string(), Step::new(row, face.inputs(gravity_mps2)))
+        };
+        Inputs {
+            columns: [false, false, false, true, true, true],
+            steps: steps.map(step).collect(),
+            ..Self::new(Path::new("faces"))
+        }
+    }
+
+    fn header(&mut self, record: &csv::ByteRecord, place: &str) -> Result<Vec<Slot>> {
+        let refuse = |problem: String, remedy: &str| Err(Error::new(place, problem, remedy));
+        let mut slots = Vec::new();
+        for name in head::texts(record) {
+            let at = |names: &[&str]| names.iter().position(|known| *known == name);
+            let input = at(&REFERENCE_COLUMNS).map(Slot::Input);
+            let step = (name == "step").then_some(Slot::Step);
             let shown = shorten(name.as_bytes());
-            if names[..i].contains(name) {
-                let problem = format!("column {shown} appears twice");
-                return Err(Error::new(place, problem, "remove one of them"));
-            }
-            let reference = REFERENCE_COLUMNS.iter().position(|known| known == name);
-            let turn = TURN_COLUMNS.iter().position(|known| known == name);
-            match reference.or(turn) {
-                Some(column) => self.columns[column] = true,
-                None if name == "step" => {}
+            match input.or(at(&TURN_COLUMNS).map(Slot::Turn)).or(step) {
+                Some(slot) if slots.contains(&slot) => {
+                    let problem = format!("column {shown} appears twice");
+                    return refuse(problem, "remove one of them");
+                }
+                Some(slot) => slots.push(slot),
                 None => {
-                    return Err(Error::new(
-                        place,
+                    return refuse(
                         format!("column {shown} is unknown"),
                         "use step, the ref_ columns of a recording, and turn_x_deg, turn_y_deg, turn_z_deg",
-                    ));
+                    );
                 }
             }
         }
-        if !names.iter().any(|name| name == "step") {
-            return Err(Error::new(
-                place,
-                "column step is missing",
-                "add it: the label or number of the dwell",
-            ));
+        if !slots.contains(&Slot::Step) {
+            let remedy = "add it: the label or number of the dwell";
+            return refuse("column step is missing".into(), remedy);
         }
-        if self.columns == [false; 6] {
-            return Err(Error::new(
-                place,
-                "the table has no column with an input",
-                "add a ref_ or turn_ column",
-            ));
+        if slots.len() == 1 {
+            let remedy = "add a ref_ or turn_ column";
+            return refuse("the table has no column with an input".into(), remedy);
         }
-        Ok(names)
+        for slot in &slots {
+            if let Slot::Input(i) | Slot::Turn(i) = slot {
+                self.columns[*i] = true;
+            }
+        }
+        Ok(slots)
     }
 
-    fn step(&mut self, record: &csv::ByteRecord, names: &[String], row: u64) -> Result<()> {
+    fn step(&mut self, record: &csv::ByteRecord, slots: &[Slot], row: u64) -> Result<()> {
         let path = self.path.display().to_string();
         let at = |name: &str| format!("{path}, row {row}, column {name}");
         let mut label = String::new();
-        let mut step = Step {
-            row,
-            input: [f64::NAN; 6],
-            turn_deg: [f64::NAN; 3],
-            used: false,
-        };
-        for (text, name) in record.iter().zip(names) {
-            if name == "step" {
-                label = String::from_utf8_lossy(text).into_owned();
-                continue;
-            }
-            let value = cell::number(text)
-                .map_err(|refusal| Error::new(at(name), refusal.problem, refusal.remedy))?;
-            if let Some(i) = REFERENCE_COLUMNS.iter().position(|known| known == name) {
-                step.input[i] = value;
-            } else if let Some(i) = TURN_COLUMNS.iter().position(|known| known == name) {
-                step.turn_deg[i] = value;
+        let mut step = Step::new(row, [f64::NAN; 6]);
+        for (text, slot) in record.iter().zip(slots) {
+            let number = |name: &str| {
+                let number = cell::number(text);
+                number.map_err(|refusal| Error::new(at(name), refusal.problem, refusal.remedy))
+            };
+            match *slot {
+                Slot::Step => label = String::from_utf8_lossy(text).into_owned(),
+                Slot::Input(i) => step.input[i] = number(REFERENCE_COLUMNS[i])?,
+                Slot::Turn(i) => step.turn_deg[i] = number(TURN_COLUMNS[i])?,
             }
         }
         for ((turn, rate), name) in step.turn_deg.iter().zip(step.input).zip(TURN_COLUMNS) {
@@ -196,19 +183,17 @@ impl Inputs {
             }
         }
         if label.is_empty() {
+            let remedy = "write the label or number of the dwell";
+            return Err(Error::new(at("step"), "the cell is empty", remedy));
+        }
+        if self.steps.insert(label.clone(), step).is_some() {
+            let label = shorten(label.as_bytes());
+            let problem = format!("{label} appears twice in the column step");
             return Err(Error::new(
                 at("step"),
-                "the cell is empty",
-                "write the label or number of the dwell",
+                problem,
+                "keep one row for each dwell",
             ));
-        }
-        let place = at("step");
-        if self.steps.insert(label.clone(), step).is_some() {
-            let problem = format!(
-                "{} appears twice in the column step",
-                shorten(label.as_bytes())
-            );
-            return Err(Error::new(place, problem, "keep one row for each dwell"));
         }
         Ok(())
     }
@@ -266,12 +251,8 @@ impl Inputs {
 
     /// A warning about the rows without a sample, if there are any.
     pub fn unused(&self) -> Option<String> {
-        let mut unused: Vec<(u64, &str)> = self
-            .steps
-            .iter()
-            .filter(|(_, step)| !step.used)
-            .map(|(label, step)| (step.row, label.as_str()))
-            .collect();
+        let unused = self.steps.iter().filter(|(_, step)| !step.used);
+        let mut unused: Vec<(u64, &str)> = unused.map(|(l, s)| (s.row, l.as_str())).collect();
         unused.sort_unstable();
         let names: Vec<&str> = unused.iter().take(10).map(|(_, label)| *label).collect();
         (!names.is_empty()).then(|| {
@@ -290,7 +271,10 @@ mod tests {
     use super::*;
 
     fn parse(text: &str) -> Result<Inputs> {
-        Inputs::parse(text.as_bytes(), Path::new("inputs.csv"))
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("inputs.csv");
+        std::fs::write(&path, text).unwrap();
+        Inputs::read(&path)
     }
 
     #[test]

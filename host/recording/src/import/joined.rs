@@ -14,9 +14,10 @@ use super::summary::ImportSummary;
 use super::time::{TimeSummary, Times};
 use crate::batch::Batch;
 use crate::columns::{Column, Columns, Layout};
+use crate::declared::{RawUnit, Reference};
 use crate::error::{Argument, Error, Result};
 use crate::health::Fault;
-use crate::manifest::{Manifest, RawUnit, Reference};
+use crate::manifest::Manifest;
 use crate::writer::Writer;
 
 /// Rows that are written at a time.
@@ -234,7 +235,7 @@ impl JoinedFiles {
         let mut warnings = files.warnings;
         let followers = files.followers.iter().map(|follower| &follower.file);
         for file in followers.chain([&files.first]) {
-            warnings.extend_from_slice(file.warnings());
+            warnings.extend_from_slice(&file.noticed().warnings);
         }
         if let Some(inputs) = &mut inputs {
             let irregular = files.first_times.filter(|_| resampler.is_some());

@@ -1,63 +1,33 @@
 //! Logs that describe their own contents: bags of ROS, logs of PX4, of ArduPilot and for Gyroflow.
 //!
-//! To add a format, write a module with a `read` and add it to [`FORMATS`].
+//! To add a format, write a module with a [`LogFormat`] and add this to [`FORMATS`].
 
 use std::path::Path;
 
-use super::readings::{Choice, Readings};
-use super::time::Decimal;
+use super::decimal::Decimal;
+use super::readings::{Choice, LogFormat, Readings};
 use super::{ardupilot, gyroflow, px4, ros};
 use crate::error::{Argument, Error, Result};
 
-/// A format: the endings of its files, the unit in which it counts time, and its reader, which converts the stamps to ns.
-struct LogFormat {
-    endings: &'static [&'static str],
-    unit: Decimal,
-    read: fn(&Path, Choice<'_>) -> Result<Vec<Readings>>,
-}
-
-const FORMATS: [LogFormat; 6] = [
-    LogFormat {
-        endings: &["bag"],
-        unit: Decimal::Nanosecond,
-        read: ros::read_bag,
-    },
-    LogFormat {
-        endings: &["mcap"],
-        unit: Decimal::Nanosecond,
-        read: ros::read_mcap,
-    },
-    LogFormat {
-        endings: &["db3"],
-        unit: Decimal::Nanosecond,
-        read: ros::read_db3,
-    },
-    LogFormat {
-        endings: &["ulg"],
-        unit: Decimal::Microsecond,
-        read: px4::read,
-    },
-    LogFormat {
-        endings: &["bin"],
-        unit: Decimal::Microsecond,
-        read: ardupilot::read,
-    },
-    LogFormat {
-        endings: &["gcsv"],
-        unit: Decimal::Microsecond,
-        read: gyroflow::read,
-    },
+const FORMATS: [&LogFormat; 6] = [
+    &ros::BAG,
+    &ros::MCAP,
+    &ros::DB3,
+    &px4::ULG,
+    &ardupilot::BIN,
+    &gyroflow::GCSV,
 ];
 
 fn format(path: &Path) -> Option<&'static LogFormat> {
-    let ending = path.extension()?.to_str()?;
-    let has = |format: &&LogFormat| {
-        format
-            .endings
-            .iter()
-            .any(|e| e.eq_ignore_ascii_case(ending))
-    };
-    FORMATS.iter().find(has)
+    let ending = path.extension()?;
+    let mut all = FORMATS.into_iter();
+    all.find(|format| ending.eq_ignore_ascii_case(format.ending))
+}
+
+/// The formats of logs for people: `ROS 1 (.bag), PX4 (.ulg)` and so on.
+pub fn log_formats() -> String {
+    let each = FORMATS.map(|format| format!("{} (.{})", format.name, format.ending));
+    each.join(", ")
 }
 
 /// Whether a file is such a log, by its ending. The readings of logs are in rad/s and m/s², their stamps in ns.

@@ -3,17 +3,18 @@
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
-use super::assignment::{ColumnList, Offset, Scale};
+use super::assignment::ColumnList;
 use super::broken::BrokenLimit;
-use super::codes::{TwosComplement, Zero};
 use super::comment_signs::{CommentSigns, TextFormat};
+use super::decimal::Decimal;
+use super::per_column::{Offset, Scale, TwosComplement, Zero};
 use super::preset::Preset;
 use super::reading_units::ReadingUnits;
 use super::readings::Choice;
 use super::row_filter::RowFilter;
 use super::row_range::RowRange;
-use super::time::Decimal;
-use crate::manifest::{RawUnit, Reference, TRUST_READINGS};
+use crate::declared::{RawUnit, Reference};
+use crate::manifest::TRUST_READINGS;
 use crate::separator::Separator;
 use crate::signed_low_byte::SignedLowByte;
 use crate::turntable::{Turntable, TurntableRate};
@@ -87,8 +88,8 @@ pub struct LogOptions {
     /// [default: by the names, by gravity at rest and by its turns]
     #[cfg_attr(feature = "clap", arg(long, value_name = "G,DEG/S", conflicts_with_all = ["raw_unit", "means"]))]
     pub units: Option<ReadingUnits>,
-    /// Topic of a bag (sensor_msgs/Imu; give two if gyro and accelerometer have one each) or of a PX4 log (sensor_gyro, sensor_combined,
-    /// vehicle_imu), or message of an ArduPilot log (IMU, GYR, IMT) [default: the only or the best one]
+    /// Topic of a bag (sensor_msgs/Imu; give two if gyro and accelerometer have one each) or of a PX4 log (sensor_gyro or
+    /// sensor_combined), or message of an ArduPilot log (IMU or GYR) [default: the only or the best one]
     #[cfg_attr(feature = "clap", arg(long))]
     pub topic: Vec<String>,
     /// Sensor of a PX4 or ArduPilot log, counted from 0 [default: the only one]

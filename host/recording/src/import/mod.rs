@@ -3,26 +3,34 @@
 mod ardupilot;
 mod assignment;
 mod binary;
-mod broken;
+pub(crate) mod broken;
 mod codes;
-mod comment_signs;
+pub(crate) mod comment_signs;
 mod copied;
 mod counter;
+mod decimal;
 mod faces;
 mod first_pass;
 mod foreign;
 mod gyroflow;
+pub(crate) mod head;
+mod header;
 mod inputs;
 mod join;
 mod joined;
 pub mod labelled;
 mod left_out;
+pub(crate) mod lines;
 mod log;
 mod log_options;
 pub mod look;
+mod name_words;
+mod names;
+pub(crate) mod noticed;
 mod options;
 #[cfg(feature = "parquet")]
-mod parquet_table;
+mod parquet_rows;
+mod per_column;
 mod plausibility;
 mod pose_means;
 mod preset;
@@ -45,10 +53,11 @@ mod sqlite;
 mod step_inputs;
 mod step_labels;
 mod summary;
+mod table;
 #[cfg(all(test, feature = "parquet"))]
 mod tests;
-mod text_table;
 mod time;
+mod unit_names;
 #[cfg(not(feature = "bags"))]
 mod without_bags;
 #[cfg(not(feature = "parquet"))]
@@ -57,20 +66,21 @@ mod without_parquet;
 #[cfg(not(feature = "bags"))]
 use without_bags as ros;
 #[cfg(not(feature = "parquet"))]
-use without_parquet as parquet_table;
+use without_parquet as parquet_rows;
 
 use std::path::Path;
 
-pub use assignment::{ColumnList, Offset, Role, Scale};
+pub use assignment::{ColumnList, Role};
 pub use broken::{BrokenKind, BrokenLimit, BrokenRows};
-pub use codes::{TwosComplement, Zero};
 pub use comment_signs::CommentSigns;
 pub use copied::CopiedTable;
+pub use decimal::Decimal;
 pub use faces::Face;
 pub use inputs::Inputs;
-pub use log::is_log;
+pub use log::{is_log, log_formats};
 pub use log_options::LogOptions;
 pub use options::ImportOptions;
+pub use per_column::{Offset, PerColumn, Scale, TwosComplement, Zero};
 pub use pose_means::{PoseMean, PoseMeans};
 pub use preset::{Chosen, Preset, PresetUse};
 pub use preview::{Preview, preview};
@@ -78,7 +88,7 @@ pub use reading_units::ReadingUnits;
 pub use row_filter::RowFilter;
 pub use row_range::RowRange;
 pub use summary::{ImportSummary, SkippedLines};
-pub use time::{Decimal, Jitter, Rounds, TimeSummary};
+pub use time::{Jitter, Rounds, TimeSummary};
 
 use joined::JoinedFiles;
 use left_out::{LeftOut, repeated};

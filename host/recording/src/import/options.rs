@@ -2,15 +2,16 @@
 
 use std::path::{Path, PathBuf};
 
-use super::assignment::Scale;
 use super::faces::Face;
 use super::foreign::HowToRead;
 use super::log_options::{LogOptions, file_name, said_if};
+use super::per_column::Scale;
 use super::preset::{Chosen, PresetUse};
 use super::row_filter::RowFilter;
+use crate::declared::{RawUnit, Reference};
 use crate::digest;
 use crate::error::{Argument, Error, Result};
-use crate::manifest::{RawUnit, Reference, Source, check_gravity, check_rate};
+use crate::manifest::{Source, check_gravity, check_rate};
 use crate::unit_name::UNNAMED;
 use crate::writer::SampleFormat;
 
@@ -83,25 +84,26 @@ impl ImportOptions {
     /// Refuses options that contradict each other, or a recording at `out` that contains one of the files.
     pub(super) fn check(&self, out: &Path) -> Result<()> {
         let refuse = |problem: String, remedy: &str| Err(Error::new("import", problem, remedy));
-        let (files, lists) = (self.files.len(), self.log.columns.len());
+        let (log, files) = (&self.log, self.files.len());
+        let (lists, faces) = (log.columns.len(), self.faces.len());
         if files == 0 {
             return refuse("no file is given".to_owned(), "name the files to import");
         }
         let one_for_all = self.is_sequence() && lists == 1;
-        let of_one_file = files == 1 && !self.is_sequence() && !self.log.means;
+        let of_one_file = files == 1 && !self.is_sequence() && !log.means;
         if lists != 0 && lists != files && !one_for_all && !of_one_file {
             return refuse(
                 format!("{files} files but {lists} lists of columns are given"),
                 "give one list of columns for each file, in their order",
             );
         }
-        if !self.faces.is_empty() && self.faces.len() != files {
+        if faces != 0 && faces != files {
             return refuse(
-                format!("{files} files but {} faces are given", self.faces.len()),
+                format!("{files} files but {faces} faces are given"),
                 "give one file for each face",
             );
         }
-        if let Some(gap) = self.log.step_gap_s
+        if let Some(gap) = log.step_gap_s
             && !(gap > 0.0 && gap.is_finite())
         {
             return refuse(
@@ -109,59 +111,55 @@ impl ImportOptions {
                 "write the seconds that separate two dwells",
             );
         }
-        if self.log.step_gap_s.is_some() && (self.is_sequence() || self.log.means) {
-            let problem =
-                "dwells are to be separated by pauses, but each file or row is a dwell already";
-            return refuse(problem.to_owned(), "leave out one of the two");
-        }
-        if let Some((_, face)) = (1..)
-            .zip(&self.faces)
-            .find(|(i, f)| self.faces[*i..].contains(f))
-        {
-            let problem = format!("the face {face} is given twice");
+        let mut each = (1..).zip(&self.faces);
+        if let Some((_, face)) = each.find(|(i, f)| self.faces[*i..].contains(f)) {
             return refuse(
-                problem,
+                format!("the face {face} is given twice"),
                 "give one file for each face, or name files with --sequence",
             );
         }
-        if !self.faces.is_empty() && self.log.inputs.is_some() {
-            let problem = "the faces give the inputs, but a table of inputs is given too";
-            return refuse(problem.to_owned(), "give one of the two");
-        }
-        if self.log.means && !self.log.signed_low_byte.is_empty() {
-            return refuse(
-                "a low byte is corrected in single samples, but these are means".to_owned(),
+        for (both, problem, remedy) in [
+            (
+                log.step_gap_s.is_some() && (self.is_sequence() || log.means),
+                "dwells are to be separated by pauses, but each file or row is a dwell already",
+                "leave out one of the two",
+            ),
+            (
+                faces != 0 && log.inputs.is_some(),
+                "the faces give the inputs, but a table of inputs is given too",
+                "give one of the two",
+            ),
+            (
+                log.means && !log.signed_low_byte.is_empty(),
+                "a low byte is corrected in single samples, but these are means",
                 "import the samples from which the means were computed",
-            );
-        }
-        if self.log.means && !(self.log.twos_complement.is_empty() && self.log.zero.is_empty()) {
-            return refuse(
-                "codes are read in single samples, but these are means".to_owned(),
+            ),
+            (
+                log.means && !(log.twos_complement.is_empty() && log.zero.is_empty()),
+                "codes are read in single samples, but these are means",
                 "import the samples, or give the means as readings",
-            );
-        }
-        if self.log.means && self.log.rows.is_some() {
-            return refuse(
-                "rows are chosen by their numbers, but this is a table of means".to_owned(),
+            ),
+            (
+                log.means && (log.rows.is_some() || !log.filters.is_empty()),
+                "rows are chosen by their numbers or by a column, but this is a table of means",
                 "give a table with only these rows",
-            );
-        }
-        if self.log.means && !self.log.filters.is_empty() {
-            return refuse(
-                "rows are chosen by a column, but this is a table of means".to_owned(),
-                "give a table with only these rows",
-            );
+            ),
+            (
+                log.means && self.reference == Reference::TurntableRate,
+                "the rate of a turntable is a reference for samples, but these are means",
+                "import the samples",
+            ),
+        ] {
+            if both {
+                return refuse(problem.to_owned(), remedy);
+            }
         }
         self.check_filters()?;
-        if let Some(rate) = self.log.rate_hz {
+        if let Some(rate) = log.rate_hz {
             check_rate(rate, "import, sample_rate_hz")
                 .map_err(|e| e.about(Argument::SampleRate))?;
         }
         check_gravity(self.gravity_mps2, "import, gravity")?;
-        if self.log.means && self.reference == Reference::TurntableRate {
-            let problem = "the rate of a turntable is a reference for samples, but these are means";
-            return refuse(problem.to_owned(), "import the samples");
-        }
         // A source inside the recording that is to be replaced would be deleted with it.
         for file in self.files.iter().chain(&self.log.inputs) {
             let (Ok(file), Ok(out)) = (file.canonicalize(), out.canonicalize()) else {

@@ -2,19 +2,21 @@
 
 use std::path::{Path, PathBuf};
 
-use super::assignment::{ColumnList, Offset, Role, Scale};
+use super::assignment::{ColumnList, Role};
 use super::broken::Unreadable;
 use super::comment_signs::TextFormat;
 use super::log::is_log;
 use super::options::{ImportOptions, source};
-use super::text_table::{Cells, TextTable};
+use super::per_column::{Offset, Scale};
+use super::table::{Cells, Table, is_parquet};
 use super::{ImportSummary, SkippedLines};
 use crate::cell::is_reading;
 use crate::columns::{Column, Columns, Layout};
+use crate::declared::Reference;
 use crate::digest;
 use crate::error::{Argument, Error, Result};
 use crate::health::impossible_temperature;
-use crate::manifest::{MANIFEST_FILE, Manifest, Reference};
+use crate::manifest::{MANIFEST_FILE, Manifest};
 use crate::separator::Separator;
 use crate::staging::Staging;
 
@@ -74,7 +76,7 @@ impl PoseMeans {
             ));
         }
         let path = directory.join(MEANS_FILE);
-        let table = Table::read(&path, None, Some(Separator::Comma).into(), (&[], &[]))?;
+        let table = Means::read(&path, None, Some(Separator::Comma).into(), (&[], &[]))?;
         if table.poses.iter().any(|pose| !pose.label.is_empty()) {
             manifest.step_labels = table.poses.iter().map(|p| p.label.clone()).collect();
         }
@@ -89,25 +91,25 @@ impl PoseMeans {
 }
 
 /// A table as it was read.
-struct Table {
+struct Means {
     poses: Vec<PoseMean>,
     columns: Columns,
     skipped: SkippedLines,
     warnings: Vec<String>,
 }
 
-impl Table {
+impl Means {
     fn read(
         path: &Path,
         list: Option<&ColumnList>,
         format: TextFormat,
         factors: (&[Scale], &[Offset]),
-    ) -> Result<Table> {
+    ) -> Result<Means> {
         let refuse = |problem: String, remedy: &str| {
             Err(Error::new(path.display(), problem, remedy).about(Argument::Columns))
         };
-        let mut table = TextTable::open(path, list, format, &[])?;
-        let roles = table.roles();
+        let mut table = Table::open(path, list, format, &[])?;
+        let roles = table.header.roles();
         let has = |role: Role| roles.contains(&role);
         let timed = [Role::Column(Column::Time), Role::Sample];
         if let Some(role) = timed.into_iter().find(|role| has(*role)) {
@@ -141,14 +143,14 @@ impl Table {
         let mut cells = Cells::default();
         let mut poses = Vec::new();
         while let Some(row) = table.next(&mut cells).map_err(Unreadable::into_error)? {
-            let place = table.place(row);
+            let place = table.header.place(row);
             poses.push(pose(&roles, &cells, factors, &columns, &place)?);
         }
-        Ok(Table {
+        Ok(Means {
             poses,
             columns,
-            skipped: table.skipped,
-            warnings: std::mem::take(&mut table.warnings),
+            skipped: table.noticed.skipped,
+            warnings: table.noticed.warnings,
         })
     }
 }
@@ -173,8 +175,8 @@ fn pose(
         Err(Error::new(place, problem, remedy))
     };
     for (&role, &number) in roles.iter().zip(&cells.numbers) {
-        let scaled =
-            |column| number * Scale::product(scales, column) + Offset::sum(offsets, column);
+        let factor = |column| -> f64 { Scale::given(scales, column).product() };
+        let scaled = |column| number * factor(column) + Offset::given(offsets, column).sum::<f64>();
         match role {
             Role::Column(Column::Raw(c)) => pose.raw[c] = scaled(Column::Raw(c)),
             Role::Column(Column::Reference(c)) => {
@@ -191,7 +193,7 @@ fn pose(
                     let remedy = "a standard deviation is 0 or more; correct the cell";
                     return refuse(role, format!("{number} is negative"), remedy);
                 }
-                pose.deviation[c] = (number * Scale::product(scales, Column::Raw(c))).abs();
+                pose.deviation[c] = (number * factor(Column::Raw(c))).abs();
             }
             Role::Averaged(which) => {
                 if number.is_nan() {
@@ -264,16 +266,12 @@ pub(super) fn import_means(options: &ImportOptions, out: &Path) -> Result<Import
             remedy,
         );
     }
-    if is_log(path)
-        || path
-            .extension()
-            .is_some_and(|e| e.eq_ignore_ascii_case("parquet"))
-    {
+    if is_log(path) || is_parquet(path) {
         return refuse("a table of means is read from text", "write it as CSV");
     }
     let list = options.log.columns.first();
     let factors = (&options.log.scale[..], &options.log.offset[..]);
-    let table = Table::read(path, list, options.log.text_format(), factors)?;
+    let table = Means::read(path, list, options.log.text_format(), factors)?;
     if options.reference == Reference::Table && table.columns.reference == [false; 6] {
         return Err(Error::new(
             path.display(),
@@ -317,7 +315,7 @@ pub(super) fn import_means(options: &ImportOptions, out: &Path) -> Result<Import
 }
 
 /// The table as CSV, with the units and column names of a recording. Labels come last, because a line that begins with # is a comment.
-fn to_csv(table: &Table) -> Vec<u8> {
+fn to_csv(table: &Means) -> Vec<u8> {
     let poses = &table.poses;
     let columns = &table.columns;
     let number = |value: f64| match value.is_nan() {

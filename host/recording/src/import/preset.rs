@@ -5,22 +5,23 @@
 mod layout;
 mod table;
 
-use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use serde::Serialize;
 
-use super::assignment::{ColumnList, Scale};
+use super::assignment::ColumnList;
 use super::broken::Unreadable;
+use super::head;
 use super::log::is_log;
-use super::text_table::{Cells, TextTable};
+use super::per_column::Scale;
+use super::table::{Cells, Table};
 use crate::cell::shorten;
+use crate::declared::RawUnit;
 use crate::error::{Argument, Error, Result};
-use crate::manifest::RawUnit;
 use crate::separator::Separator;
-use layout::Layout;
 pub use layout::Preset;
+use layout::{Layout, Rate};
 use table::PRESETS;
 
 /// Bytes at the start of a file that contain its header and the lines above it.
@@ -138,7 +139,7 @@ impl Preset {
         }
     }
 
-    /// Applies the preset to `paths`. With `recognise`, files without a header never fit.
+    /// Applies the preset to `paths`; `recognise`: it was not named.
     fn of(
         &self,
         paths: &[PathBuf],
@@ -151,11 +152,6 @@ impl Preset {
                 true => files.extend(self.files_in(path)?),
                 false => files.push(path.clone()),
             }
-        }
-        if let (Some([problem, remedy]), [first, _, ..], false) =
-            (self.not_joinable, &files[..], recognise)
-        {
-            return Err(Error::new(first.display(), problem, remedy).into());
         }
         let mut chosen = Chosen {
             used: PresetUse {
@@ -171,7 +167,7 @@ impl Preset {
             warnings: Vec::new(),
         };
         for file in &files {
-            let (layout, list, rate_hz) = self.layout(file, separator, recognise)?;
+            let (layout, list, rate_hz) = self.layout(file, separator)?;
             for text in layout.scales {
                 let scale: Scale = text.parse()?;
                 if !chosen.scales.contains(&scale) {
@@ -225,7 +221,6 @@ impl Preset {
         &self,
         path: &Path,
         separator: Option<Separator>,
-        recognise: bool,
     ) -> std::result::Result<(&'static Layout, ColumnList, Option<f64>), Unfit> {
         let refused = |problem: String, remedy: &str| {
             let error = Error::new(path.display(), problem, remedy);
@@ -236,18 +231,18 @@ impl Preset {
             return Err(Error::new(path.display(), problem, "leave it out").into());
         }
         let name = path.file_name().unwrap_or_default().to_string_lossy();
-        let head = head(path)?;
+        let (head, _) = head::open(path, HEAD)?;
+        let head = String::from_utf8_lossy(&head);
         let mut nearest: Option<(Vec<String>, Error)> = None;
-        for layout in self.layouts.iter().filter(|l| l.file.fits(&name)) {
+        let fits = |layout: &&Layout| {
+            layout
+                .file
+                .is_none_or(|own| own.eq_ignore_ascii_case(&name))
+        };
+        for layout in self.layouts.iter().filter(fits) {
             let list: ColumnList = layout.columns.parse()?;
-            if recognise && matches!(list, ColumnList::ByPosition(_)) {
-                continue;
-            }
             let rate_hz = layout.rate_hz(path, &head);
-            let outcome = match rate_hz {
-                Some(None) => Err(layout.without_rate(path)),
-                _ => layout.read(path, list, separator),
-            };
+            let outcome = rate_hz.and_then(|rate| Ok((layout.read(path, list, separator)?, rate)));
             match (outcome, layout.refusal) {
                 (Ok(_), Some([problem, remedy])) => {
                     return Err(Unfit::NoReadings(Error::new(
@@ -256,7 +251,7 @@ impl Preset {
                         remedy,
                     )));
                 }
-                (Ok(list), None) => return Ok((layout, list, rate_hz.flatten())),
+                (Ok((list, rate_hz)), None) => return Ok((layout, list, rate_hz)),
                 (Err(error), _) => {
                     let missing = layout.missing(&head);
                     if nearest
@@ -313,34 +308,29 @@ impl Preset {
 }
 
 impl Layout {
-    /// The sample rate that a line above the data or a file beside it contains: `None` if this layout has no such line, `Some(None)` if it is missing.
-    fn rate_hz(&self, path: &Path, head: &str) -> Option<Option<f64>> {
-        if let Some([ending, words]) = self.rate_beside {
-            let text = std::fs::read_to_string(path.with_extension(ending)).unwrap_or_default();
-            return Some(rate_after(&text, words));
-        }
-        Some(rate_after(head, self.rate_after?))
-    }
-
-    /// That [`Self::rate_hz`] is missing.
-    fn without_rate(&self, path: &Path) -> Error {
-        let (problem, remedy) = match self.rate_beside {
-            Some([ending, words]) => (
-                format!(
+    /// The sample rate that a line above the data or a file beside it contains, if this layout has such a line.
+    fn rate_hz(&self, path: &Path, head: &str) -> Result<Option<f64>> {
+        let (found, problem, remedy) = match self.rate {
+            None => return Ok(None),
+            Some(Rate::Beside(ending, words)) => {
+                let beside = path.with_extension(ending);
+                let text = std::fs::read_to_string(&beside).unwrap_or_default();
+                let problem = format!(
                     "{} beside it, with the sample rate after {words:?}, is missing or has none",
-                    path.with_extension(ending).display()
-                ),
-                "put it beside the file, or name the columns and the rate",
-            ),
-            None => (
-                format!(
-                    "no line above the data contains {:?} with the sample rate",
-                    self.rate_after.unwrap_or_default()
-                ),
-                "export it with its header, or name the columns",
-            ),
+                    beside.display()
+                );
+                let remedy = "put it beside the file, or name the columns and the rate";
+                (rate_after(&text, words), problem, remedy)
+            }
+            Some(Rate::Above(words)) => {
+                let problem =
+                    format!("no line above the data contains {words:?} with the sample rate");
+                let remedy = "export it with its header, or name the columns";
+                (rate_after(head, words), problem, remedy)
+            }
         };
-        Error::new(path.display(), problem, remedy)
+        let missing = || Error::new(path.display(), problem, remedy);
+        found.map(Some).ok_or_else(missing)
     }
 
     /// Its columns in `path`, including the optional ones that are there. If a column is the time, the first row must have a time.
@@ -353,7 +343,7 @@ impl Layout {
         let more = format!("{},{}", self.columns, self.optional);
         if !self.optional.is_empty()
             && let Ok(more) = more.parse()
-            && TextTable::open(path, Some(&more), separator.into(), &[]).is_ok()
+            && Table::open(path, Some(&more), separator.into(), &[]).is_ok()
         {
             return self.timed(path, more, separator);
         }
@@ -366,7 +356,7 @@ impl Layout {
         list: ColumnList,
         separator: Option<Separator>,
     ) -> Result<ColumnList> {
-        let mut table = TextTable::open(path, Some(&list), separator.into(), &[])?;
+        let mut table = Table::open(path, Some(&list), separator.into(), &[])?;
         let mut cells = Cells::default();
         let row = match table.next(&mut cells) {
             // The import itself reports this.
@@ -394,15 +384,6 @@ impl Layout {
             _ => Vec::new(),
         }
     }
-}
-
-/// The beginning of a file as text.
-fn head(path: &Path) -> Result<String> {
-    let io = |error: std::io::Error| Error::io(path, &error);
-    let file = std::fs::File::open(path).map_err(io)?;
-    let mut head = Vec::new();
-    file.take(HEAD).read_to_end(&mut head).map_err(io)?;
-    Ok(String::from_utf8_lossy(&head).into_owned())
 }
 
 /// The number after `words` in one of the first lines.

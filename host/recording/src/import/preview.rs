@@ -1,18 +1,15 @@
 //! The beginning of a foreign file, shown to a person who names its columns.
 
-use std::io::Read as _;
 use std::path::Path;
 
 use serde::Serialize;
 
-use super::binary::{refuse_binary, without_zeros};
-use super::comment_signs::CommentSigns;
+use super::head::{self, Kind, LineFormat};
 use super::labelled::{Line, Samples, UNITS};
 use super::log::is_log;
-use super::parquet_table;
-use super::text_table::split;
+use super::parquet_rows;
+use super::table::is_parquet;
 use crate::cell;
-use crate::csv_file::BOM;
 use crate::error::{Error, Result};
 use crate::separator::Separator;
 
@@ -46,33 +43,23 @@ pub struct Preview {
 /// # Errors
 /// The file cannot be read, is of another kind, or has no line of numbers.
 pub fn preview(path: &Path, separator: Option<Separator>, most: usize) -> Result<Preview> {
-    let ending = path.extension().unwrap_or_default();
     if is_log(path) {
         return Ok(Preview {
             log: true,
             ..Preview::default()
         });
     }
-    if ending.eq_ignore_ascii_case("parquet") {
-        let (names, rows) = parquet_table::first_rows(path, most)?;
+    if is_parquet(path) {
+        let (names, rows) = parquet_rows::first_rows(path, most)?;
         return Ok(Preview {
             names,
             rows,
             ..Preview::default()
         });
     }
-    let io = |error: std::io::Error| Error::io(path, &error);
-    let file = std::fs::File::open(path).map_err(io)?;
-    let mut head = Vec::new();
     let enough = (1 << 16) + ROW * most as u64;
-    file.take(enough).read_to_end(&mut head).map_err(io)?;
-    refuse_binary(path, &head)?;
-    let head = head.strip_prefix(BOM).unwrap_or(&head);
-    let mut lines: Vec<&[u8]> = head.split(|b| *b == b'\n').map(without_zeros).collect();
-    // The last one may be cut.
-    if head.len() as u64 >= enough - BOM.len() as u64 {
-        lines.pop();
-    }
+    let (head, _) = head::open(path, enough)?;
+    let lines = head::lines(&head, enough);
     let found = table_or_labelled(&lines, separator, most);
     found.ok_or_else(|| {
         let problem = "no line is a row of numbers";
@@ -117,31 +104,18 @@ fn begins_with_label(cell: &str) -> bool {
 }
 
 fn of_lines(lines: &[&[u8]], separator: Option<Separator>, most: usize) -> Option<Preview> {
-    let signs = CommentSigns::default();
-    let comment = |line: &[u8]| signs.begins(line).is_some();
-    let shown: Vec<&[u8]> = lines
-        .iter()
-        .filter(|line| !line.trim_ascii().is_empty() && !comment(line))
-        .copied()
-        .collect();
-    let separator = separator.unwrap_or_else(|| Separator::detect(&shown));
+    let format = LineFormat::of(lines, separator.into());
     let cells = |line: &[u8]| {
         let mut record = csv::ByteRecord::new();
-        split(separator, line, &mut record);
+        format.split(line, &mut record);
         let text = |cell: &[u8]| String::from_utf8_lossy(cell).into_owned();
         record.iter().map(text).collect::<Vec<String>>()
     };
-    let number = |cell: &String| {
-        let point = match separator.separates(b',') {
-            true => cell.clone(),
-            false => cell.replacen(',', ".", 1),
-        };
-        cell::number(point.as_bytes()).is_ok_and(f64::is_finite)
-    };
-    let numbers = |row: &[String]| row.iter().filter(|cell| number(cell)).count();
+    let number = |cell: &&String| format.number(cell.as_bytes()).is_ok_and(f64::is_finite);
+    let numbers = |row: &[String]| row.iter().filter(number).count();
     let is_row = |line: &&[u8]| {
         let row = cells(line);
-        !comment(line) && row.len() > 1 && 2 * numbers(&row) > row.len()
+        matches!(format.kind(line), Kind::Other) && row.len() > 1 && 2 * numbers(&row) > row.len()
     };
     let first = lines.iter().position(is_row)?;
     let row = cells(lines[first]);
@@ -153,7 +127,7 @@ fn of_lines(lines: &[&[u8]], separator: Option<Separator>, most: usize) -> Optio
     let above = lines[..first]
         .iter()
         .rev()
-        .map(|line| cells(signs.skipped(line)));
+        .map(|line| cells(format.comments.skipped(line)));
     let mut headers = above.filter(is_header);
     let nearest = headers.next().unwrap_or_default();
     let (mut names, units) = match headers.next() {
@@ -171,7 +145,7 @@ fn of_lines(lines: &[&[u8]], separator: Option<Separator>, most: usize) -> Optio
         units,
         rate_hz: lines[..first].iter().find_map(|line| stated_rate(line)),
         rows: rows.take(most).map(|line| cells(line)).collect(),
-        separator: known.then_some(separator),
+        separator: known.then_some(format.separator),
         ..Preview::default()
     })
 }

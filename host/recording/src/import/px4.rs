@@ -15,11 +15,20 @@ use px4_ulog::stream_parser::file_reader::{Message, SimpleCallbackResult};
 use px4_ulog::stream_parser::model::{Completeness, DataMessage, ParameterMessage};
 use px4_ulog::stream_parser::read_file_with_simple_callback;
 
-use super::readings::{Choice, Readings, guarded};
+use super::decimal::Decimal;
+use super::readings::{Choice, LogFormat, Readings, guarded};
 use crate::columns::Column;
 use crate::error::{Argument, Error, Result};
 use calibration::{Parameters, Sensor};
 use topics::{Combined, Topic, u32_in};
+
+/// Logs of PX4.
+pub(super) const ULG: LogFormat = LogFormat {
+    name: "PX4",
+    ending: "ulg",
+    unit: Decimal::Microsecond,
+    read,
+};
 
 /// Signature at the start of a log, and length of its header in bytes.
 const SIGNATURE: &[u8] = b"ULog\x01\x12\x35";
@@ -27,8 +36,6 @@ const HEADER: u64 = 16;
 
 /// The topics that are read.
 const COMBINED: &str = "sensor_combined";
-/// Integrals of gyro and accelerometer, one instance for each unit, calibrated like `sensor_combined`; read only if it is chosen.
-const INTEGRATED: &str = "vehicle_imu";
 const SELECTION: &str = "sensor_selection";
 /// Topics of one sensor each: gyro and accelerometer.
 const RAW: [&str; 2] = ["sensor_gyro", "sensor_accel"];
@@ -44,8 +51,6 @@ struct Log {
     /// By name and instance.
     topics: BTreeMap<(&'static str, u32), Topic>,
     combined: Combined,
-    /// Instances of `vehicle_imu`, each with the parameters as they change between its samples.
-    integrated: BTreeMap<u32, (Combined, Parameters)>,
     /// Ids of the gyro and the accelerometer in use, each pair with the number of its first sample in `sensor_combined`.
     selected: Vec<(usize, [u32; 2])>,
     parameters: Parameters,
@@ -55,7 +60,7 @@ struct Log {
 }
 
 /// Reads a log.
-pub(super) fn read(path: &Path, choice: Choice<'_>) -> Result<Vec<Readings>> {
+fn read(path: &Path, choice: Choice<'_>) -> Result<Vec<Readings>> {
     let place = path.to_str().ok_or_else(|| {
         let problem = "the name of the file is not UTF-8";
         Error::new(path.display(), problem, "rename it")
@@ -103,12 +108,6 @@ impl Log {
                 let taken = match data.flattened_format.message_name() {
                     COMBINED => self.combined.take(data),
                     SELECTION => self.select(data),
-                    INTEGRATED => {
-                        let instance = u32::from(data.multi_id.value());
-                        let now = || (Combined::default(), self.parameters.now());
-                        let (samples, _) = self.integrated.entry(instance).or_insert_with(now);
-                        samples.take_integrated(data)
-                    }
                     name => match RAW.into_iter().chain(FIFO).find(|raw| *raw == name) {
                         Some(raw) => {
                             let instance = u32::from(data.multi_id.value());
@@ -130,9 +129,6 @@ impl Log {
     fn set(&mut self, name: &str, value: f64) {
         self.parameters
             .set(self.combined.stamps_ns.len(), name, value);
-        for (samples, parameters) in self.integrated.values_mut() {
-            parameters.set(samples.stamps_ns.len(), name, value);
-        }
     }
 
     fn select(&mut self, data: &DataMessage<'_>) -> Option<()> {
@@ -169,9 +165,6 @@ impl Log {
             Some(COMBINED) if combined > 0 && choice.instance.is_none() => {
                 return self.combined_readings(path, false);
             }
-            Some(INTEGRATED) if !self.integrated.is_empty() => {
-                return self.integrated_readings(path, choice.instance);
-            }
             Some(topic) if FIFO.contains(&topic) => FIFO,
             Some(topic) if RAW.contains(&topic) => RAW,
             Some(_) => ["", ""],
@@ -183,7 +176,7 @@ impl Log {
             let error = Error::new(path.display(), problem, remedy);
             return Err(error.about(Argument::Topic).about(Argument::Instance));
         }
-        self.raw_readings(path, of_raw, choice.instance)
+        self.raw_readings(path, of_raw, choice)
     }
 
     /// The topics to choose from.
@@ -192,36 +185,11 @@ impl Log {
             format!("{name} instance {instance} ({})", topic.named())
         });
         let combined = (!self.combined.stamps_ns.is_empty()).then(|| COMBINED.to_owned());
-        let integrated = self.integrated.keys();
-        let integrated = integrated.map(|instance| format!("{INTEGRATED} instance {instance}"));
-        let all: Vec<String> = raw.chain(combined).chain(integrated).collect();
+        let all: Vec<String> = raw.chain(combined).collect();
         match all.is_empty() {
             true => "no messages of inertial sensors".into(),
             false => all.join(", "),
         }
-    }
-
-    /// The instance to read, among those that `there` are.
-    fn instance(
-        &self,
-        path: &Path,
-        there: impl Iterator<Item = u32>,
-        wanted: Option<u32>,
-    ) -> Result<u32> {
-        let mut instances: Vec<u32> = there.collect();
-        instances.sort_unstable();
-        instances.dedup();
-        let problem = match (wanted, instances.as_slice()) {
-            (None, [only]) => return Ok(*only),
-            (Some(wanted), all) if all.contains(&wanted) => return Ok(wanted),
-            (Some(wanted), _) => format!(
-                "the log has no instance {wanted}; it has: {}",
-                self.listed()
-            ),
-            (None, _) => format!("the log has several sensors: {}", self.listed()),
-        };
-        let error = Error::new(path.display(), problem, "choose one of the instances");
-        Err(error.about(Argument::Instance))
     }
 
     /// The topics of gyro and accelerometer, of one instance.
@@ -229,11 +197,12 @@ impl Log {
         &self,
         path: &Path,
         names: [&'static str; 2],
-        instance: Option<u32>,
+        choice: Choice<'_>,
     ) -> Result<Vec<Readings>> {
         let of_topics = self.topics.keys();
         let of_topics = of_topics.filter(|(name, _)| names.contains(name));
-        let instance = self.instance(path, of_topics.map(|(_, i)| *i), instance)?;
+        let instances = of_topics.map(|(_, instance)| *instance);
+        let instance = choice.instance_of(path, instances, &self.listed())?;
         let mut both: Vec<(usize, &'static str, &Topic)> = (0..)
             .zip(names)
             .filter_map(|(sensor, name)| Some((sensor, name, self.topics.get(&(name, instance))?)))
@@ -336,21 +305,6 @@ impl Log {
             &ids,
             &what,
         )])
-    }
-
-    /// The readings of an instance of `vehicle_imu`.
-    fn integrated_readings(&self, path: &Path, wanted: Option<u32>) -> Result<Vec<Readings>> {
-        let instance = self.instance(path, self.integrated.keys().copied(), wanted)?;
-        let Some((samples, parameters)) = self.integrated.get(&instance) else {
-            return Ok(Vec::new());
-        };
-        let ids = Sensor::ALL.map(|sensor| {
-            let all = samples.devices.iter();
-            all.map(|(from, ids)| (*from, ids[sensor as usize]))
-                .collect()
-        });
-        let what = format!("{INTEGRATED} instance {instance}");
-        Ok(vec![uncalibrated(samples, parameters, &ids, &what)])
     }
 
     /// Warnings about what the logger lost and how the file ended.

@@ -1,14 +1,28 @@
 //! Rows that the readers of logs have read.
 
+use std::collections::BTreeSet;
 use std::panic::{UnwindSafe, catch_unwind};
 use std::path::Path;
 
 use super::assignment::Role;
-use super::text_table::Cells;
+use super::decimal::Decimal;
+use super::table::Cells;
 use super::time::Stamp;
+use crate::ahead::reader_panicked;
 use crate::columns::Column;
 use crate::error::{Argument, Error, Result};
-use crate::in_order::reader_panicked;
+
+/// A format of logs.
+pub(super) struct LogFormat {
+    /// Who writes it.
+    pub name: &'static str,
+    /// The ending of its files.
+    pub ending: &'static str,
+    /// The unit in which it counts time.
+    pub unit: Decimal,
+    /// Its reader, which converts the stamps to ns.
+    pub read: fn(&Path, Choice<'_>) -> Result<Vec<Readings>>,
+}
 
 /// The chosen sensor in a log.
 #[derive(Debug, Clone, Copy, Default)]
@@ -35,6 +49,29 @@ impl<'a> Choice<'a> {
                 Err(Error::new(path.display(), problem, remedy).about(Argument::Topic))
             }
         }
+    }
+
+    /// The instance that is wanted, or the only one of those `there`; `listed` names all.
+    pub fn instance_of(
+        &self,
+        path: &Path,
+        there: impl Iterator<Item = u32>,
+        listed: &str,
+    ) -> Result<u32> {
+        let there: BTreeSet<u32> = there.collect();
+        let problem = match (self.instance, there.first()) {
+            (None, Some(only)) if there.len() == 1 => return Ok(*only),
+            (Some(wanted), _) if there.contains(&wanted) => return Ok(wanted),
+            (Some(wanted), _) => format!("the log has no instance {wanted}; it has: {listed}"),
+            (None, Some(_)) => format!("the log has several sensors: {listed}"),
+            (None, None) => format!("the log has {listed}"),
+        };
+        let remedy = match there.is_empty() {
+            true => "log the messages of the inertial sensors",
+            false => "choose one of the instances",
+        };
+        let error = Error::new(path.display(), problem, remedy);
+        Err(error.about(Argument::Topic).about(Argument::Instance))
     }
 }
 

@@ -12,11 +12,36 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-use super::readings::{Choice, Readings, guarded};
+use super::decimal::Decimal;
+use super::readings::{Choice, LogFormat, Readings, guarded};
 use super::sqlite::Database;
 use crate::columns::Column;
 use crate::error::{Argument, Error, Result};
 use definition::Before;
+
+/// Bags of ROS 1.
+pub(super) const BAG: LogFormat = LogFormat {
+    name: "ROS 1",
+    ending: "bag",
+    unit: Decimal::Nanosecond,
+    read: read_bag,
+};
+
+/// Bags of ROS 2 in MCAP.
+pub(super) const MCAP: LogFormat = LogFormat {
+    name: "ROS 2",
+    ending: "mcap",
+    unit: Decimal::Nanosecond,
+    read: read_mcap,
+};
+
+/// Bags of ROS 2 in SQLite.
+pub(super) const DB3: LogFormat = LogFormat {
+    name: "ROS 2",
+    ending: "db3",
+    unit: Decimal::Nanosecond,
+    read: read_db3,
+};
 
 /// Bytes that are read at a time.
 const PIECE: usize = 1 << 18;
@@ -265,7 +290,7 @@ fn damaged(path: &Path, error: &dyn std::fmt::Display) -> Error {
 }
 
 /// Reads a bag of ROS 1.
-pub(super) fn read_bag(path: &Path, choice: Choice<'_>) -> Result<Vec<Readings>> {
+fn read_bag(path: &Path, choice: Choice<'_>) -> Result<Vec<Readings>> {
     chosen(path, guarded(path, || messages_of_bag(path))?, choice)
 }
 
@@ -328,7 +353,7 @@ fn merge(found: &mut Found) {
 }
 
 /// Reads an MCAP file.
-pub(super) fn read_mcap(path: &Path, choice: Choice<'_>) -> Result<Vec<Readings>> {
+fn read_mcap(path: &Path, choice: Choice<'_>) -> Result<Vec<Readings>> {
     chosen(path, guarded(path, || messages_of_mcap(path))?, choice)
 }
 
@@ -383,7 +408,7 @@ fn messages_of_mcap(path: &Path) -> Result<Found> {
 }
 
 /// Reads a bag of ROS 2 in an SQLite file.
-pub(super) fn read_db3(path: &Path, choice: Choice<'_>) -> Result<Vec<Readings>> {
+fn read_db3(path: &Path, choice: Choice<'_>) -> Result<Vec<Readings>> {
     // The last messages of a database that was not closed are in a file beside it.
     let mut beside = path.as_os_str().to_owned();
     beside.push("-wal");

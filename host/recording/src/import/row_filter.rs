@@ -109,25 +109,9 @@ impl RowFilters {
             self.kept += 1;
             return true;
         }
-        self.keep_cells(at.iter().map(|at| String::from_utf8_lossy(&cells[*at])))
-    }
-
-    /// Whether [`Self::keep`] would keep the row; it is not counted.
-    pub fn hold(&self, at: &[usize], cells: &csv::ByteRecord) -> bool {
-        let holds = |(tally, at): (&Tally, &usize)| {
-            let cell = cells.get(*at).map(String::from_utf8_lossy);
-            cell.is_none_or(|cell| tally.filter.holds(cell.trim()))
-        };
-        self.filters.iter().zip(at).all(holds)
-    }
-
-    /// [`Self::keep`] of a row whose `cells` of the filters' columns are given, in the order of the filters.
-    pub fn keep_cells<'a>(
-        &mut self,
-        cells: impl Iterator<Item = std::borrow::Cow<'a, str>>,
-    ) -> bool {
         let mut all = true;
-        for (tally, cell) in self.filters.iter_mut().zip(cells) {
+        for (tally, at) in self.filters.iter_mut().zip(at) {
+            let cell = String::from_utf8_lossy(&cells[*at]);
             let cell = cell.trim();
             let holds = tally.filter.holds(cell);
             tally.found |= holds;
@@ -141,6 +125,15 @@ impl RowFilters {
             false => self.left_out += 1,
         }
         all
+    }
+
+    /// Whether [`Self::keep`] would keep the row; it is not counted.
+    pub fn hold(&self, at: &[usize], cells: &csv::ByteRecord) -> bool {
+        let holds = |(tally, at): (&Tally, &usize)| {
+            let cell = cells.get(*at).map(String::from_utf8_lossy);
+            cell.is_none_or(|cell| tally.filter.holds(cell.trim()))
+        };
+        self.filters.iter().zip(at).all(holds)
     }
 
     /// At the end of `path`: refuses a value that no row had.

@@ -16,9 +16,10 @@ use super::step_inputs::StepInputs;
 use super::step_labels::StepLabels;
 use super::{ImportOptions, ImportSummary};
 use crate::columns::Columns;
+use crate::declared::Reference;
 use crate::error::{Argument, Error, Result};
 use crate::health::{Fault, Finding, SENSORS};
-use crate::manifest::{Manifest, Reference};
+use crate::manifest::Manifest;
 use crate::writer::Writer;
 
 /// Rates of two files may differ by this share: a loop without a timer is not equally fast each time.
@@ -265,9 +266,7 @@ fn add(all: &mut ImportSummary, one: ImportSummary) {
     all.time.extend(one.time);
     all.notes.extend(one.notes);
     all.warnings.extend(one.warnings);
-    all.skipped.header += one.skipped.header;
-    all.skipped.comment += one.skipped.comment;
-    all.skipped.blank += one.skipped.blank;
+    all.skipped.add(one.skipped);
     all.broken_rows.extend(one.broken_rows);
     all.interpolated += one.interpolated;
     all.padding += one.padding;

@@ -12,8 +12,8 @@ use super::step_labels::StepLabels;
 use super::time::Times;
 use crate::batch::Batch;
 use crate::cell::shorten;
+use crate::declared::Reference;
 use crate::error::Result;
-use crate::manifest::Reference;
 
 /// A table of inputs, and the inputs of the steps met so far.
 pub(super) struct StepInputs {

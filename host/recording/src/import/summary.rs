@@ -20,6 +20,15 @@ pub struct SkippedLines {
     pub blank: u64,
 }
 
+impl SkippedLines {
+    /// Adds those of another file.
+    pub(super) fn add(&mut self, other: Self) {
+        self.header += other.header;
+        self.comment += other.comment;
+        self.blank += other.blank;
+    }
+}
+
 /// The result of `mimu import`, with the fields of its JSON.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct ImportSummary {
@@ -72,22 +81,23 @@ impl ImportSummary {
     /// Adds the counts, notes and warnings of `file`.
     pub(super) fn add(&mut self, file: &ForeignFile) {
         let place = file_name(file.path());
-        let notes = file.notes().iter().map(|note| format!("{place}: {note}"));
+        let noticed = file.noticed();
+        let notes = noticed.notes.iter().map(|note| format!("{place}: {note}"));
         self.notes.extend(notes);
         let found = file.seen.found(file.rate_hz()).into_iter();
         let warnings = found.map(|found| format!("{place}: {found}"));
         self.warnings.extend(warnings);
         self.padding += file.seen.padding();
-        if let Some((lines, first)) = file.restarts() {
+        if let Some((lines, first)) = noticed.restarts {
             self.warnings.push(format!(
                 "{place}: {} of words among the rows, the first in row {first}, left out: the logger started again there, and its bias may have changed; if its clock started again too, the pause is unknown",
                 plural(lines, "line")
             ));
         }
-        if file.zero_bytes() > 0 {
+        if noticed.zero_bytes > 0 {
             self.warnings.push(format!(
                 "{place}: {} bytes of 0 before and after its lines were left out: reserved space that was never written",
-                file.zero_bytes()
+                noticed.zero_bytes
             ));
         }
         if file.stamp_wraps() > 0 {
@@ -96,10 +106,7 @@ impl ImportSummary {
                 times(file.stamp_wraps())
             ));
         }
-        let skipped = file.skipped();
-        self.skipped.header += skipped.header;
-        self.skipped.comment += skipped.comment;
-        self.skipped.blank += skipped.blank;
+        self.skipped.add(noticed.skipped);
         if file.wraps() > 0 {
             self.warnings.push(format!(
                 "{}: the column sample wrapped to 0 {}, like a counter of 16 or 32 bits, and was unwrapped",

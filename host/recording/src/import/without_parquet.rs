@@ -3,40 +3,32 @@
 use std::convert::Infallible;
 use std::path::Path;
 
-use super::assignment::{ColumnList, Role};
-use super::broken::Unreadable;
-use super::row_filter::{RowFilter, RowFilters};
-use super::text_table::Cells;
 use crate::error::Result;
 use crate::without_parquet::refused;
 
 /// Never constructed.
 #[derive(Debug)]
-pub(super) struct ParquetTable {
-    pub filters: RowFilters,
-    pub warnings: Vec<String>,
-    never: Infallible,
-}
+pub(super) struct ParquetRows(Infallible);
 
-impl ParquetTable {
-    pub fn open(path: &Path, _: Option<&ColumnList>, _: &[RowFilter]) -> Result<ParquetTable> {
+impl ParquetRows {
+    pub fn open(path: &Path) -> Result<Self> {
         Err(refused(path))
     }
 
-    pub fn roles(&self) -> Vec<Role> {
-        match self.never {}
+    pub fn names(&self) -> Vec<String> {
+        match self.0 {}
     }
 
-    pub fn time_name(&self) -> Option<String> {
-        match self.never {}
+    pub fn read_columns(&mut self, _: impl Iterator<Item = usize>) -> Result<()> {
+        match self.0 {}
     }
 
     pub fn progress(&self) -> f64 {
-        match self.never {}
+        match self.0 {}
     }
 
-    pub fn next(&mut self, _: &mut Cells) -> std::result::Result<Option<u64>, Unreadable> {
-        match self.never {}
+    pub fn next(&mut self, _: &mut csv::ByteRecord) -> Result<Option<u64>> {
+        match self.0 {}
     }
 }
 

@@ -5,7 +5,7 @@
 
 use std::path::PathBuf;
 
-use super::super::text_table::Cells;
+use super::super::table::Cells;
 use super::super::time::Stamp;
 use super::*;
 use crate::tests::says;
@@ -143,13 +143,6 @@ fn a_sensor_with_messages_at_its_own_rate_is_read_by_them() {
         rows(&mut open(&fixture(), Some("IMU"), Some(1)).unwrap()[0]).len(),
         12
     );
-}
-
-#[test]
-fn what_was_gathered_in_an_interval_becomes_its_mean() {
-    let mut all = open(&fixture(), Some("IMT"), Some(0)).unwrap();
-    let rows = rows(&mut all[0]);
-    close(&rows[4].1, &[0.5, -0.5, 0.0, 1.0, 1.0, -8.0]);
 }
 
 #[test]

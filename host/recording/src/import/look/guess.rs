@@ -5,12 +5,10 @@
 
 use serde::Serialize;
 
-use super::names::{
-    Meaning, are_seconds_of, clock_unit, clock_unit_within, force_unit, is_other, meaning,
-    rate_unit,
-};
 use crate::RAW_COLUMNS;
-use crate::import::time::Decimal;
+use crate::import::decimal::Decimal;
+use crate::import::names::{Meaning, are_seconds_of, is_other, meaning};
+use crate::import::unit_names::{clock_unit, clock_unit_within, force_unit, rate_unit};
 use crate::units::{Series, UnitFound, accel_unit, gyro_unit};
 
 /// A guess for one file.

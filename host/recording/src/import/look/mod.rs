@@ -5,7 +5,6 @@
 //! happen, because every number of the calibration is then wrong by its factor.
 
 mod guess;
-mod names;
 #[cfg(test)]
 mod tests;
 
@@ -14,11 +13,14 @@ use std::path::{Path, PathBuf};
 use self::guess::grows_evenly;
 pub use guess::{Guess, Units, guess};
 
-use self::names::{Meaning, meaning, unknown_triad};
-use super::assignment::{ColumnList, Role, Scale};
+use super::assignment::{ColumnList, Role};
+use super::decimal::Decimal;
+use super::log_options::file_name;
+use super::names::{Meaning, meaning, unknown_triad};
+use super::per_column::Scale;
 use super::preview::{Preview, preview};
 use super::reading_units::{ReadingUnits, STANDARD_GRAVITY, si};
-use super::time::{Decimal, Seen, Unit, calendar_time};
+use super::time::{Seen, Unit, calendar_time};
 use crate::error::{Argument, Error, Result};
 use crate::separator::Separator;
 use crate::units::UnitFound;
@@ -53,6 +55,16 @@ pub struct FileLook {
 }
 
 impl FileLook {
+    /// Its name without its folder.
+    fn file(&self) -> String {
+        file_name(&self.path)
+    }
+
+    /// The column with this role.
+    fn at(&self, role: &str) -> Option<usize> {
+        self.guess.roles.iter().position(|own| *own == role)
+    }
+
     /// See [`Look::columns_to_complete`]; `counts` are the known axes of gyro and accelerometer.
     fn columns_to_complete(&self, counts: [usize; 2]) -> String {
         let roles = &self.guess.roles;
@@ -144,8 +156,7 @@ impl Look {
         let (mut looks, mut numbers) = (Vec::new(), Vec::new());
         for path in files {
             let seen = preview(path, separator, ROWS)?;
-            let file = path.file_name().unwrap_or_default().to_string_lossy();
-            let (mut guess, rows) = guess_preview(&file, &seen);
+            let (mut guess, rows) = guess_preview(&file_name(path), &seen);
             if !guess.calendar {
                 guess.time_unit = given.time_unit.or(guess.time_unit);
             }
@@ -203,23 +214,15 @@ impl Look {
 
     /// Asks about columns that are missing or that only the readings suggest.
     fn take_columns(&mut self, numbers: &[Vec<Vec<f64>>], given: &Given) {
-        let roles: Vec<&str> = self
-            .files
-            .iter()
-            .flat_map(|look| look.guess.roles.iter().copied())
-            .collect();
-        let has = |role: &str| roles.contains(&role);
+        let has = |role: &str| self.files.iter().any(|look| look.at(role).is_some());
         let axes = |sensor: &str| {
             let found = ["x", "y", "z"].map(|axis| has(&format!("{sensor}_{axis}")));
             found.iter().filter(|f| **f).count()
         };
         let [gyro, accel] = ["gyro", "accel"].map(axes);
-        let names: Vec<String> = self
-            .files
-            .iter()
-            .flat_map(|look| look.names.clone())
-            .filter(|name| !name.is_empty())
-            .collect();
+        let timed = has("t_s");
+        let names = self.files.iter().flat_map(|look| look.names.clone());
+        let names: Vec<String> = names.filter(|name| !name.is_empty()).collect();
         let list = &self.columns_to_complete();
         if gyro + accel == 0 {
             let about = match names.is_empty() {
@@ -244,35 +247,26 @@ impl Look {
         self.ask_about_names([gyro, accel], list);
         // A file with one triad may be named after its sensor.
         let unnamed = self.files.iter().any(|look| {
-            let file = look
-                .path
-                .file_name()
-                .unwrap_or_default()
-                .to_string_lossy()
-                .to_lowercase();
-            let by_file = gyro + accel == 3 && (file.contains("acc") || file.contains("gyr"));
+            let file = look.file().to_lowercase();
+            let own = look.guess.roles.iter().filter(|r| RAW_COLUMNS.contains(r));
+            let by_file = own.count() == 3 && (file.contains("acc") || file.contains("gyr"));
             look.guess.by_readings && !by_file
         });
         if unnamed && accel == 3 {
             // Gravity is seen, so the accelerometer is the one with gravity in it; else only a person knows.
-            let known = self
-                .accel
-                .as_ref()
-                .is_some_and(|found| matches!(found.unit, Some("m/s²" | "g" | "mg")));
-            let counts = self
-                .accel
-                .as_ref()
-                .is_some_and(|found| found.unit == Some("count") && nominal(found).is_some());
+            let seen = self.accel.as_ref().is_some_and(|found| match found.unit {
+                Some("count") => nominal(found).is_some(),
+                unit => matches!(unit, Some("m/s²" | "g" | "mg")),
+            });
             // Two rows may have any magnitude.
             let enough = numbers.iter().all(|rows| rows.len() >= FEWEST_ROWS);
-            if !enough || !known && !counts {
+            if !enough || !seen {
                 let about =
                     "the file has no names, and the readings do not show which triad feels gravity"
                         .into();
                 self.ask(about, Argument::Columns, list);
             }
         }
-        let timed = has("t_s");
         if !timed && !given.rate {
             self.ask_for_time(numbers, list);
         } else if timed && !given.rate && given.time_unit.is_none() && self.time_unit().is_none() {
@@ -283,18 +277,11 @@ impl Look {
     /// The columns as options, with what is known of them: by name where the names are distinct, else from the left.
     fn columns_to_complete(&self) -> String {
         let roles = self.files.iter().flat_map(|look| &look.guess.roles);
-        let count = |sensor: &str| {
-            roles
-                .clone()
-                .filter(|role| role.starts_with(sensor))
-                .count()
-        };
+        let count = |sensor: &str| roles.clone().filter(|r| r.starts_with(sensor)).count();
         let counts = [count("gyro_"), count("accel_")];
-        let lists = self
-            .files
-            .iter()
-            .map(|look| look.columns_to_complete(counts));
-        lists.collect::<Vec<String>>().join(" --columns ")
+        let lists = self.files.iter();
+        let lists: Vec<String> = lists.map(|l| l.columns_to_complete(counts)).collect();
+        lists.join(" --columns ")
     }
 
     /// Asks for the rate, or whether a column that grows is the time.
@@ -364,23 +351,14 @@ impl Look {
 
     /// Asks about time stamps without a unit in which their rate is that of no inertial unit, or of two.
     fn check_clock(&mut self, numbers: &[Vec<Vec<f64>>]) {
-        let Some((look, rows)) = self
-            .files
-            .iter()
-            .zip(numbers)
-            .find(|(look, _)| look.guess.roles.contains(&"t_s"))
+        let mut timed = self.files.iter().zip(numbers);
+        let Some((look, rows, at)) = timed.find_map(|(l, rows)| Some((l, rows, l.at("t_s")?)))
         else {
             return;
         };
         if look.guess.calendar {
             return;
         }
-        let at = look
-            .guess
-            .roles
-            .iter()
-            .position(|role| *role == "t_s")
-            .unwrap_or(0);
         let name = look.names.get(at).cloned().unwrap_or_default();
         let times: Vec<f64> = rows.iter().filter_map(|row| row.get(at).copied()).collect();
         // One by one: a counter, whose rate nobody knows.
@@ -414,34 +392,25 @@ impl Look {
         if given.raw_unit {
             return;
         }
-        for (sensor, found, unit, choices) in [
-            (
-                "accelerometer",
-                self.accel.clone(),
-                "ACCEL_UNIT",
-                "g, m/s2, mg or count",
-            ),
-            (
-                "gyro",
-                self.gyro.clone(),
-                "GYRO_UNIT",
-                "deg/s, rad/s, mdeg/s or count",
-            ),
-        ] {
-            if let Some(UnitFound {
-                unit: None, reason, ..
-            }) = found
-            {
+        let found = [&self.gyro, &self.accel];
+        let [gyro, accel] = found.map(|found| found.as_ref()?.unit);
+        let open = |found: &Option<UnitFound>| match found {
+            Some(found) if found.unit.is_none() => Some(found.reason.clone()),
+            _ => None,
+        };
+        let open = found.map(open);
+        let is_open = open.iter().any(Option::is_some);
+        let sensors = [
+            ("gyro", "GYRO_UNIT", "deg/s, rad/s, mdeg/s or count"),
+            ("accelerometer", "ACCEL_UNIT", "g, m/s2, mg or count"),
+        ];
+        for ((sensor, unit, choices), reason) in sensors.into_iter().zip(open).rev() {
+            if let Some(reason) = reason {
                 let about = format!("the unit of the {sensor} is open ({choices}): {reason}");
                 self.ask(about, Argument::Units, unit);
             }
         }
-        let [gyro, accel] = [&self.gyro, &self.accel].map(|f| f.as_ref().and_then(|f| f.unit));
-        let missing = [(&self.gyro, gyro), (&self.accel, accel)];
-        if missing
-            .iter()
-            .any(|(found, unit)| found.is_some() && unit.is_none())
-        {
+        if is_open {
             return;
         }
         let sizes = [gyro.map(si), accel.map(si)];
@@ -494,30 +463,19 @@ impl Look {
                 Some(name) if !name.is_empty() => name.clone(),
                 _ => format!("column {}", k + 1),
             };
-            let used = look
-                .guess
-                .roles
-                .iter()
-                .enumerate()
-                .filter(|(_, role)| **role != "-");
-            let used: Vec<String> = used
-                .map(|(k, role)| format!("{role} = {}", of(k)))
-                .collect();
-            let left: Vec<String> = (0..look.guess.roles.len())
-                .filter(|k| look.guess.roles[*k] == "-")
-                .map(of)
-                .filter(|n| !n.is_empty())
-                .collect();
+            let roles = look.guess.roles.iter().enumerate();
+            let (left, used): (Vec<_>, Vec<_>) = roles.partition(|(_, role)| **role == "-");
+            let used = used
+                .into_iter()
+                .map(|(k, role)| format!("{role} = {}", of(k)));
+            let used: Vec<String> = used.collect();
+            let left: Vec<String> = left.into_iter().map(|(k, _)| of(k)).collect();
             let place = match self.files.len() {
                 1 => String::new(),
-                _ => format!(
-                    "{}: ",
-                    look.path.file_name().unwrap_or_default().to_string_lossy()
-                ),
+                _ => format!("{}: ", look.file()),
             };
             lines.push(format!("{place}{}", used.join(", ")));
-            let time = look.guess.roles.iter().position(|role| *role == "t_s");
-            if let Some(at) = time.filter(|_| look.guess.grows) {
+            if let Some(at) = look.at("t_s").filter(|_| look.guess.grows) {
                 lines.push(format!("{place}{} grows evenly, so it is the time", of(at)));
             }
             if !left.is_empty() && look.separator.is_none() {

@@ -339,3 +339,26 @@ fn a_date_beside_a_clock_needs_no_unit_and_a_clock_that_starts_again_no_end() {
     });
     assert_eq!(restarted.gyro.unwrap().unit, Some("rad/s"));
 }
+
+/// As those of IMU-TK.
+#[test]
+fn two_files_with_the_names_of_their_sensors_need_no_names_of_columns() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, z: i32| {
+        let row = |i: usize| format!("  {:.7e}  331{}  333  {z}\n", 0.01 * i as f64, i % 10);
+        let path = folder.path().join(name);
+        std::fs::write(&path, (0..60).map(row).collect::<String>()).unwrap();
+        path
+    };
+    let files = [write("unit_acc.mat", 36_400), write("unit_gyro.mat", 500)];
+    let given = Given {
+        raw_unit: true,
+        ..Given::default()
+    };
+    let look = Look::at(&files, None, &given).unwrap();
+    assert_eq!(look.questions, []);
+    assert_eq!(
+        look.files[1].guess.roles,
+        ["t_s", "gyro_x", "gyro_y", "gyro_z"]
+    );
+}

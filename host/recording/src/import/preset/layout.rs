@@ -1,6 +1,6 @@
 //! What is known about a maker's files.
 
-use crate::manifest::RawUnit;
+use crate::declared::RawUnit;
 
 /// The files of one maker: their names, columns and units.
 #[derive(Debug, Clone, Copy)]
@@ -15,8 +15,6 @@ pub struct Preset {
     pub(super) layouts: &'static [Layout],
     /// Files that a folder may contain, the best set first; the faster sensor first in each.
     pub(super) in_folder: &'static [&'static [&'static str]],
-    /// Why its files cannot be joined, and the remedy, if they have no time in common.
-    pub(super) not_joinable: Option<[&'static str; 2]>,
     /// A file beside the readings that decides between two presets with the same headers.
     pub(super) beside: Option<Beside>,
 }
@@ -24,17 +22,16 @@ pub struct Preset {
 /// One kind of file.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Layout {
-    pub file: FileName,
+    /// The name that a file must have if its header does not show the sensor. Case is ignored.
+    pub file: Option<&'static str>,
     /// Its columns, all of which must be there, written as for the command line.
     pub columns: &'static str,
     /// Columns that it may have.
     pub optional: &'static str,
     /// Factors of columns, signs included, written as for the command line.
     pub scales: &'static [&'static str],
-    /// Words after which a line above the data has the sample rate in Hz. The line is required.
-    pub rate_after: Option<&'static str>,
-    /// Ending of a file of the same name beside it, and words in that file after which it has the sample rate in Hz. The file is required.
-    pub rate_beside: Option<[&'static str; 2]>,
+    /// Where the sample rate is. The line is required.
+    pub rate: Option<Rate>,
     /// Why such a file is refused, and the remedy.
     pub refusal: Option<[&'static str; 2]>,
 }
@@ -43,34 +40,23 @@ impl Layout {
     /// A layout of which only the names in the header are known.
     pub const fn of(columns: &'static str) -> Layout {
         Layout {
-            file: FileName::Any,
+            file: None,
             columns,
             optional: "",
             scales: &[],
-            rate_after: None,
-            rate_beside: None,
+            rate: None,
             refusal: None,
         }
     }
 }
 
-/// The name that a file must have if its header does not show the sensor. Case is ignored.
+/// Where a file has its sample rate, Hz.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum FileName {
-    Any,
-    Is(&'static str),
-    Has(&'static str),
-}
-
-impl FileName {
-    pub fn fits(self, name: &str) -> bool {
-        let name = name.to_lowercase();
-        match self {
-            FileName::Any => true,
-            FileName::Is(own) => name == own.to_lowercase(),
-            FileName::Has(part) => name.contains(&part.to_lowercase()),
-        }
-    }
+pub(super) enum Rate {
+    /// After these words in a line above the data.
+    Above(&'static str),
+    /// In a file of the same name with this ending, after these words.
+    Beside(&'static str, &'static str),
 }
 
 /// A table of one row that lies beside the files.

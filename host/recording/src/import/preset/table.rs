@@ -1,12 +1,12 @@
 //! The presets. To add a maker, add an entry here and a line in the table of `docs/import.md`.
 
-use super::layout::{Beside, FileName, Layout, Preset};
-use crate::manifest::RawUnit;
+use super::layout::{Beside, Layout, Preset, Rate};
+use crate::declared::RawUnit;
 
 /// A file of Sensor Logger: all have the same header, so the name shows the sensor.
 const fn sensor_logger(file: &'static str, columns: &'static str) -> Layout {
     Layout {
-        file: FileName::Is(file),
+        file: Some(file),
         scales: &["t_s=1e-9"],
         ..Layout::of(columns)
     }
@@ -41,12 +41,12 @@ const LOGGED_FOLDER: [&[&str]; 6] = [
 /// Calibrated readings of the packets, and the temperature if it was exported.
 const XSENS: Layout = Layout {
     optional: "temp_c=Temperature",
-    rate_after: Some("Update Rate:"),
+    rate: Some(Rate::Above("Update Rate:")),
     ..Layout::of("")
 };
 
 /// All of them.
-pub(super) const PRESETS: [Preset; 8] = [
+pub(super) const PRESETS: [Preset; 6] = [
     // The header of every imu0/data.csv of the EuRoC sequences and of those laid out like them (TUM VI, MRPT, OpenVINS); Burri et al., The EuRoC
     // micro aerial vehicle datasets, IJRR 2016. Stamps count from 1970; sensor.yaml beside the file gives no units.
     Preset {
@@ -61,7 +61,6 @@ pub(super) const PRESETS: [Preset; 8] = [
             )
         }],
         in_folder: &[&["data.csv"], &["imu0/data.csv"], &["mav0/imu0/data.csv"]],
-        not_joinable: None,
         beside: None,
     },
     // github.com/tszheichoi/awesome-sensor-logger at b10f5c5: README.md (Metadata.csv), UNITS.md, COORDINATES.md, CROSSPLATFORM.md. The columns are
@@ -80,7 +79,6 @@ pub(super) const PRESETS: [Preset; 8] = [
             without_gravity("Gravity.csv"),
         ],
         in_folder: &LOGGED_FOLDER,
-        not_joinable: None,
         beside: Some(Beside {
             file: "Metadata.csv",
             values: &AS_ANDROID,
@@ -104,7 +102,6 @@ pub(super) const PRESETS: [Preset; 8] = [
             without_gravity("Gravity.csv"),
         ],
         in_folder: &LOGGED_FOLDER,
-        not_joinable: None,
         beside: Some(Beside {
             file: "Metadata.csv",
             values: &AS_ANDROID,
@@ -147,7 +144,6 @@ pub(super) const PRESETS: [Preset; 8] = [
             &["Raw Data.csv"],
             &["Accelerometer.csv"],
         ],
-        not_joinable: None,
         beside: None,
     },
     // Text exports of MT Manager: lines with // above the names, one of which has the rate. Units by the MTw user manual (table of exported data):
@@ -169,52 +165,6 @@ pub(super) const PRESETS: [Preset; 8] = [
             },
         ],
         in_folder: &[],
-        not_joinable: None,
-        beside: None,
-    },
-    // github.com/Kyle-ak/imu_tk at 7780270: bin/test_data and importAsciiData in src/io_utils.cpp. Either raw counts or SI.
-    Preset {
-        name: "imu_tk",
-        title: "imu_tk: one file each, time x y z, named with acc and gyr",
-        raw_unit: None,
-        layouts: &[
-            Layout {
-                file: FileName::Has("acc"),
-                ..Layout::of("t_s,accel_x,accel_y,accel_z")
-            },
-            Layout {
-                file: FileName::Has("gyr"),
-                ..Layout::of("t_s,gyro_x,gyro_y,gyro_z")
-            },
-        ],
-        in_folder: &[],
-        not_joinable: None,
-        beside: None,
-    },
-    // github.com/IntelRealSense/librealsense at 0f85e5c: np.savetxt in tools/rs-imu-calibration/rs-imu-calibration.py, and frame.get_timestamp, in
-    // ms. The script switches the correction of the device off. Its axes are those of the camera: x right, y down, z forward. The accelerometer's
-    // file contains the six directions one after another. The gyro's file is emptied before each direction, so it contains only the last one.
-    Preset {
-        name: "realsense",
-        title: "Intel RealSense D435i: accel_*.txt or gyro_*.txt of rs-imu-calibration.py",
-        raw_unit: Some(RawUnit::Si),
-        layouts: &[
-            Layout {
-                file: FileName::Has("accel"),
-                scales: &["t_s=1e-3"],
-                ..Layout::of("t_s,accel_x,accel_y,accel_z")
-            },
-            Layout {
-                file: FileName::Has("gyro"),
-                scales: &["t_s=1e-3"],
-                ..Layout::of("t_s,gyro_x,gyro_y,gyro_z")
-            },
-        ],
-        in_folder: &[],
-        not_joinable: Some([
-            "rs-imu-calibration.py keeps the gyro's readings of the last of the six directions only, so a joined file has only that direction",
-            "import each file separately",
-        ]),
         beside: None,
     },
     // github.com/jitingcn/SlimeVR-Tracker-nRF-Receiver at 87996f1: scripts/data_collect_hid.py and data_collect_cdc.py. The numbers are those of the
@@ -226,13 +176,12 @@ pub(super) const PRESETS: [Preset; 8] = [
         layouts: &[Layout {
             optional: "temp_c=temp",
             scales: &["gyro=0.017453292519943295", "accel=9.80665"],
-            rate_beside: Some(["meta.txt", "gyro_odr_hz="]),
+            rate: Some(Rate::Beside("meta.txt", "gyro_odr_hz=")),
             ..Layout::of(
                 "sample=seq,gyro_x=gx,gyro_y=gy,gyro_z=gz,accel_x=ax,accel_y=ay,accel_z=az",
             )
         }],
         in_folder: &[],
-        not_joinable: None,
         beside: None,
     },
 ];

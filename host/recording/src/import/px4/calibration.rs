@@ -77,17 +77,6 @@ impl Parameters {
         }
     }
 
-    /// The present values, for samples that have not begun.
-    pub fn now(&self) -> Self {
-        let epochs = self.epochs.last();
-        Self {
-            epochs: epochs
-                .map(|(_, values)| (0, values.clone()))
-                .into_iter()
-                .collect(),
-        }
-    }
-
     /// Id of the calibrated sensor, if only one is calibrated.
     pub fn only_id(&self, sensor: Sensor) -> Option<u32> {
         let (_, values) = self.epochs.last()?;

@@ -3,7 +3,7 @@
 
 use std::path::PathBuf;
 
-use super::super::text_table::Cells;
+use super::super::table::Cells;
 use super::super::time::Stamp;
 use super::*;
 use crate::tests::says;
@@ -79,51 +79,6 @@ fn the_raw_topics_of_an_instance_are_what_pyulog_reads() {
     );
     let warned = all[0].warnings.join(" ");
     says(&warned, &["dropouts of the logger: 1, 30 ms"]);
-}
-
-/// `delta_angle` over `delta_angle_dt`, and so for the velocity, by pyulog; here PX4 has an offset of the accelerometer and no other correction.
-#[test]
-fn the_integrals_of_vehicle_imu_are_read_as_means_without_the_calibration() {
-    let Some(path) = real("sample_px4_events.ulg") else {
-        return;
-    };
-    let mut all = open(&path, Some("vehicle_imu"), None).unwrap();
-    assert_eq!(all.len(), 1);
-    let rows = rows(&mut all[0]);
-    assert_eq!(rows.len(), 62);
-    assert_eq!(rows[0].0, Stamp::from(1_710_773_350_710_000_000));
-    let offset = [-0.039_018_109, 0.025_656_465, 0.003_192_006];
-    for (row, gyro, accel) in [
-        (
-            0,
-            [-0.017_044_233, -0.002_130_543, -0.005_059_998],
-            [0.031_835_505, -0.023_262_093, -9.782_308_713],
-        ),
-        (
-            61,
-            [-0.003_994_745, -0.004_527_36, 0.003_462_124],
-            [0.003_105_085, -0.007_699_783, -9.796_674_363],
-        ),
-    ] {
-        let raw: Vec<f64> = accel.iter().zip(offset).map(|(a, o)| a + o).collect();
-        // The board is trimmed by a millionth of a degree.
-        close(&rows[row].1, &[&gyro[..], &raw].concat(), 2e-6);
-    }
-    let Some(path) = real("sample_log_small.ulg") else {
-        return;
-    };
-    let error = open(&path, Some("vehicle_imu"), None).unwrap_err();
-    says(&error.to_string(), &["vehicle_imu instance 2"]);
-    // The mean of twelve at rest, against that of six readings of the raw topics: their scatter is 0.03 to 0.06 m/s².
-    let mut all = open(&path, Some("vehicle_imu"), Some(0)).unwrap();
-    let rows = self::rows(&mut all[0]);
-    let mean = |k: usize| rows.iter().map(|r| r.1[k]).sum::<f64>() / rows.len() as f64;
-    close(&[mean(3), mean(4), mean(5)], &[0.678, 0.263, -9.752], 0.04);
-    close(
-        &[mean(0), mean(1), mean(2)],
-        &[-0.0431, 0.0071, 0.0326],
-        0.004,
-    );
 }
 
 /// The unit is at rest. The board is mounted with a yaw of 180 deg and trimmed by 0.76 and -2.94 deg. The expected values are those of pyulog, with

@@ -15,14 +15,12 @@ pub(super) struct Topic {
     pub calibrated: bool,
 }
 
-/// Samples of `sensor_combined`, or of an instance of `vehicle_imu`.
+/// Samples of `sensor_combined`.
 #[derive(Default)]
 pub(super) struct Combined {
     pub stamps_ns: Vec<i64>,
     pub gyro: Vec<[f64; 3]>,
     pub accel: Vec<[f64; 3]>,
-    /// Ids of gyro and accelerometer as the topic gives them, each pair with the number of its first sample. `sensor_combined` gives none.
-    pub devices: Vec<(usize, [u32; 2])>,
 }
 
 impl Topic {
@@ -82,40 +80,10 @@ impl Combined {
             three_in(data, "gyro_rad")?,
             three_in(data, "accelerometer_m_s2")?,
         );
-        self.push(stamp_ns, gyro, accel);
-        Some(())
-    }
-
-    /// Takes a message of `vehicle_imu`: the mean rate and specific force over its interval, which ends at its time. `None` if it lacks a field.
-    ///
-    /// `VehicleIMU::Publish` of PX4-Autopilot calibrates the means like those of `sensor_combined`, and multiplies by the interval.
-    pub fn take_integrated(&mut self, data: &DataMessage<'_>) -> Option<()> {
-        let stamp_ns = nanoseconds(u64_in(data, "timestamp_sample")?)?;
-        let mean = |what: &str| -> Option<[f64; 3]> {
-            let interval = format!("delta_{what}_dt");
-            // 16 bits in older logs.
-            let us = field::<u16>(data, &interval)
-                .map(u32::from)
-                .or_else(|| u32_in(data, &interval))?;
-            let of_interval = three_in(data, &format!("delta_{what}"))?;
-            (us > 0).then(|| of_interval.map(|sum| sum / (f64::from(us) * 1e-6)))
-        };
-        let (gyro, accel) = (mean("angle")?, mean("velocity")?);
-        let ids = [
-            u32_in(data, "gyro_device_id")?,
-            u32_in(data, "accel_device_id")?,
-        ];
-        if self.devices.last().is_none_or(|(_, before)| *before != ids) {
-            self.devices.push((self.stamps_ns.len(), ids));
-        }
-        self.push(stamp_ns, gyro, accel);
-        Some(())
-    }
-
-    fn push(&mut self, stamp_ns: i64, gyro: [f64; 3], accel: [f64; 3]) {
         self.stamps_ns.push(stamp_ns);
         self.gyro.push(gyro);
         self.accel.push(accel);
+        Some(())
     }
 }
 

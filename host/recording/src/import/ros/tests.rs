@@ -9,7 +9,7 @@
 
 use std::path::PathBuf;
 
-use super::super::text_table::Cells;
+use super::super::table::Cells;
 use super::super::time::Stamp;
 use super::*;
 use crate::tests::says;

@@ -23,19 +23,12 @@ fn directions() -> String {
     text
 }
 
-fn realsense(bench: &Bench, files: &[&str]) -> Result<ImportOptions> {
-    let paths: Vec<PathBuf> = files.iter().map(|name| bench.path(name)).collect();
-    let chosen = Preset::choose(Some("realsense".parse().unwrap()), &paths, None)?.unwrap();
-    let mut options = bench.options(files, &[]);
-    options.raw_unit = chosen.raw_unit.unwrap();
-    Ok(options.with_preset(chosen))
-}
-
 #[test]
 fn the_six_directions_of_a_realsense_camera_are_steps_with_known_inputs() {
     let inputs = "step,ref_force_x_mps2,ref_force_y_mps2,ref_force_z_mps2\n0,0,-9.81,0\n1,9.81,0,0\n2,0,9.81,0\n3,-9.81,0,0\n4,0,0,-9.81\n5,0,0,9.81\n";
     let bench = Bench::new(&[("accel_cam.txt", &directions()), ("inputs", inputs)]);
-    let mut options = realsense(&bench, &["accel_cam.txt"]).unwrap();
+    let mut options = bench.options(&["accel_cam.txt"], &["t_s,accel_x,accel_y,accel_z"]);
+    options.raw_unit = RawUnit::Si;
     options.log.step_gap_s = Some(1.0);
     options.reference = Reference::Table;
     options.log.inputs = Some(bench.path("inputs"));
@@ -57,25 +50,6 @@ fn the_six_directions_of_a_realsense_camera_are_steps_with_known_inputs() {
     // Without the pause, the file has no steps for the inputs.
     options.log.step_gap_s = None;
     assert!(bench.refused(&options).contains("no column is step"));
-}
-
-#[test]
-fn the_two_files_of_a_realsense_camera_are_not_joined() {
-    let bench = Bench::new(&[
-        ("accel_cam.txt", &directions()),
-        ("gyro_cam.txt", &directions()),
-    ]);
-    let error = realsense(&bench, &["gyro_cam.txt", "accel_cam.txt"])
-        .unwrap_err()
-        .to_string();
-    assert!(error.contains("last of the six directions"), "{error}");
-    let (summary, batch, _) = bench
-        .import(&realsense(&bench, &["gyro_cam.txt"]).unwrap())
-        .unwrap();
-    assert_eq!(
-        (summary.rows, batch.raw[0].len(), batch.raw[3].len()),
-        (240, 240, 0)
-    );
 }
 
 #[test]

@@ -241,46 +241,6 @@ fn xsens_goes_by_its_clock_or_where_that_is_empty_by_its_counter_and_the_rate_ab
 }
 
 #[test]
-fn the_files_of_imu_tk_are_told_apart_by_their_names_and_have_no_unit_of_their_own() {
-    let file = |x: f64, y: f64, z: f64| {
-        rows(20, |i| {
-            format!("  {:.7e}  {x:.7e}  {y:.7e} {z:.7e}", 0.01 * f64::from(i))
-        })
-    };
-    let accel = file(33_100.0, 33_300.0, 36_400.0);
-    let bench = Bench::new(&[
-        ("unit_acc.mat", &accel),
-        ("unit_gyro.mat", &file(32_780.0, 32_420.0, 32_500.0)),
-        ("unit.mat", &accel),
-    ]);
-    let files = ["unit_acc.mat", "unit_gyro.mat"];
-    let (summary, batch, _) = bench.import_with(Some("imu_tk"), &files).unwrap();
-    let first = batch.raw.map(|column| column[0]);
-    assert_eq!(
-        first,
-        [32_780.0, 32_420.0, 32_500.0, 33_100.0, 33_300.0, 36_400.0]
-    );
-    assert_eq!(summary.sample_rate_hz, 100.0);
-    assert_eq!(
-        bench
-            .preset(Some("imu_tk"), &files)
-            .unwrap()
-            .unwrap()
-            .raw_unit,
-        None
-    );
-    assert!(
-        bench.preset(None, &files).unwrap().is_none(),
-        "without a header nothing is recognised"
-    );
-    let error = bench
-        .preset(Some("imu_tk"), &["unit.mat"])
-        .unwrap_err()
-        .to_string();
-    assert!(error.contains("has no file of this name"), "{error}");
-}
-
-#[test]
 fn what_is_given_by_hand_goes_before_a_preset() {
     let bench = Bench::new(&[("data.csv", &euroc())]);
     let chosen = bench.preset(None, &["data.csv"]).unwrap().unwrap();

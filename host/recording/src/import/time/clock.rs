@@ -4,11 +4,12 @@ use std::path::Path;
 
 use serde::Serialize;
 
+use super::super::decimal::Decimal;
 use super::counting::Counting;
 use super::gap::{Gap, Jitter};
 use super::polled::Rounds;
 use super::regular::{Irregular, Regular};
-use super::stamp::{Decimal, Seen, Stamp, Unit};
+use super::stamp::{Seen, Stamp, Unit};
 use super::stamps::Stamps;
 use crate::error::{Argument, Error, Result};
 
@@ -86,11 +87,6 @@ impl Times {
         // A logger that is faster than its sensor writes rows twice. Bursts of a sensor at rest may look the same, but also contain equal stamps with
         // different readings.
         let drops_repeats = stamps.shared == 0 && !stamps.repeats.is_empty();
-        let repeated_rows = if drops_repeats {
-            stamps.repeats.len()
-        } else {
-            0
-        };
         if drops_repeats {
             let (mut row, mut repeats) = (0, stamps.repeats.iter().peekable());
             stamps.since_first.retain(|_| {
@@ -153,7 +149,11 @@ impl Times {
             lasts_s,
             wraps: stamps.wraps,
             rate_in_bursts_hz: regular.in_bursts_s.map(|period| tidy(1.0 / period)),
-            repeated_rows: repeated_rows as u64,
+            repeated_rows: if drops_repeats {
+                stamps.repeats.len() as u64
+            } else {
+                0
+            },
             polled: regular.polled,
         };
         Ok(Times {
@@ -179,6 +179,11 @@ impl Times {
     }
 }
 
+/// Place of an error about the stamps.
+fn time_column(path: &Path) -> String {
+    format!("{}, column t_s", path.display())
+}
+
 /// A rate without its last digits, which are rounding of the time stamps.
 fn tidy(rate_hz: f64) -> f64 {
     format!("{rate_hz:.7e}").parse().unwrap_or(rate_hz)
@@ -187,7 +192,7 @@ fn tidy(rate_hz: f64) -> f64 {
 /// The unit of `stamps`, which `seen` describes: given, that of the file to which they are joined, or recognised.
 fn unit(path: &Path, stamps: &Stamps, seen: &Seen<'_>, known: &Known<'_>) -> Result<Unit> {
     let counter = |rate_hz: Option<f64>, problem: String, remedy: &str| {
-        let place = format!("{}, column t_s", path.display());
+        let place = time_column(path);
         rate_hz
             .map(Unit::Samples)
             .ok_or_else(|| Error::new(place, problem, remedy).about(Argument::SampleRate))
@@ -225,7 +230,7 @@ fn count_or_clock(path: &Path, stamps: &Stamps, seen: &Seen<'_>) -> Error {
     let unit = Unit::recognise(seen).unwrap_or_else(|[_, coarse]| coarse);
     let rate = three_digits(unit.per_second() as f64 / seen.interval);
     Error::new(
-        format!("{}, column t_s", path.display()),
+        time_column(path),
         format!(
             "it contains whole numbers whose smallest step is 1, without a period: a counter of samples of which {missing:.0} % are missing, or times in {unit} ({rate} Hz)"
         ),
@@ -251,10 +256,7 @@ fn not_rising(path: &Path, stamps: &Stamps, known: &Known<'_>) -> Error {
     if rows < 2 {
         return refused(path, Irregular::Short);
     }
-    let (place, value) = (
-        format!("{}, column t_s", path.display()),
-        stamps.first.value,
-    );
+    let (place, value) = (time_column(path), stamps.first.value);
     let since = &stamps.since_first;
     let [falling, rising] = [moves(stamps, |s| s < 0.0), moves(stamps, |s| s > 0.0)];
     if 4 * falling > 3 * since.len() {
@@ -298,7 +300,7 @@ fn refused(path: &Path, irregular: Irregular) -> Error {
             "import the rows before that row, and those from it on, as separate recordings; or sort the rows by time",
         ),
         Irregular::OffTheCount(off_s) => Error::new(
-            format!("{}, column t_s", path.display()),
+            time_column(path),
             format!(
                 "the times are up to {off_s:.3} s off the sample count, which late hand-overs do not explain, and their intervals are not multiples of one period"
             ),
@@ -320,8 +322,7 @@ fn either(path: &Path, seen: &Seen<'_>, both: [Decimal; 2]) -> Error {
     };
     let [fine, coarse] = both;
     let refused = |problem: String, remedy: String| {
-        let place = format!("{}, column t_s", path.display());
-        Error::new(place, problem, remedy).about(Argument::TimeUnit)
+        Error::new(time_column(path), problem, remedy).about(Argument::TimeUnit)
     };
     let problem = format!(
         "the times may be in {} or in {}",

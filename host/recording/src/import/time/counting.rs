@@ -3,8 +3,11 @@
 //! A packet counter rises by 1 from sample to sample and by more where samples were lost. Taken as milliseconds, a counter with a third of its samples
 //! lost is a plausible clock of 667 Hz, so whole numbers with steps of 1 are examined before their unit is.
 
+use super::super::decimal::Decimal;
+use super::super::names::{Meaning, is_number, meaning};
+use super::super::unit_names::clock_unit_behind;
 use super::gap::quantile;
-use super::stamp::{Decimal, Seen, Unit};
+use super::stamp::{Seen, Unit};
 use super::stamps::Stamps;
 
 /// Least share of steps of 1. Of random losses this leaves out only those of more than nineteen samples in twenty.
@@ -61,41 +64,14 @@ enum Named {
 
 impl Named {
     fn of(name: &str) -> Named {
-        const TIME: [&str; 8] = [
-            "time", "stamp", "date", "clock", "milli", "micro", "nano", "tick",
-        ];
-        const COUNTER: [&str; 18] = [
-            "packet", "counter", "count", "cnt", "ctr", "number", "num", "nr", "no", "index",
-            "idx", "seq", "sequence", "sample", "samples", "frame", "row", "id",
-        ];
-        if Decimal::in_name(name).is_some() {
-            return Named::Unit;
-        }
-        let lower = name.to_lowercase();
-        if TIME.iter().any(|word| lower.contains(word)) {
-            return Named::Time;
-        }
-        match words(name).iter().any(|w| COUNTER.contains(&w.as_str())) {
-            true => Named::Counter,
-            false => Named::Nothing,
+        match meaning(name) {
+            _ if clock_unit_behind(name).is_some() => Named::Unit,
+            // A lone t may be short for anything.
+            Meaning::Time if name.len() > 2 => Named::Time,
+            _ if is_number(name) => Named::Counter,
+            _ => Named::Nothing,
         }
     }
-}
-
-/// The words of a name in lower case: `PacketCounter` and `packet_counter` have two.
-fn words(name: &str) -> Vec<String> {
-    let mut words = vec![String::new()];
-    let mut lower = false;
-    for c in name.chars() {
-        if !c.is_alphanumeric() || (lower && c.is_uppercase()) {
-            words.push(String::new());
-        }
-        lower = c.is_lowercase();
-        if let Some(last) = words.last_mut().filter(|_| c.is_alphanumeric()) {
-            last.extend(c.to_lowercase());
-        }
-    }
-    words
 }
 
 /// Whether all stamps are whole numbers, and enough of their steps are 1.

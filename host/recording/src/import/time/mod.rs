@@ -5,6 +5,7 @@ mod clock;
 mod counting;
 mod gap;
 mod grid;
+mod lateness;
 mod polled;
 mod regular;
 mod stamp;
@@ -13,7 +14,6 @@ mod stamps;
 pub use clock::TimeSummary;
 pub use gap::Jitter;
 pub use polled::Rounds;
-pub use stamp::Decimal;
 
 pub(super) use calendar::parse as calendar_time;
 pub(super) use clock::{Clock, Known, Times};

@@ -1,12 +1,7 @@
 //! Time stamps of a file, and their unit.
 
-use std::fmt;
-use std::str::FromStr;
-
-use serde::Serialize;
-
-use crate::cell::shorten;
-use crate::error::Error;
+use super::super::decimal::Decimal;
+use super::super::unit_names::clock_unit_behind;
 
 /// A time stamp in the unit of its file.
 ///
@@ -124,94 +119,6 @@ pub(in super::super) enum Unit {
     Samples(f64),
 }
 
-/// Units that clocks count in.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub enum Decimal {
-    /// s
-    #[serde(rename = "s")]
-    Second,
-    /// ms
-    #[serde(rename = "ms")]
-    Millisecond,
-    /// µs
-    #[serde(rename = "us")]
-    Microsecond,
-    /// ns
-    #[serde(rename = "ns")]
-    Nanosecond,
-}
-
-impl Decimal {
-    /// All of them.
-    pub const ALL: [Decimal; 4] = [
-        Decimal::Second,
-        Decimal::Millisecond,
-        Decimal::Microsecond,
-        Decimal::Nanosecond,
-    ];
-
-    /// Its size, s.
-    pub fn seconds(self) -> f64 {
-        1.0 / self.per_second() as f64
-    }
-
-    /// The unit that the name of a column ends with, as `timestamp_us` and `time [ms]` do.
-    pub(super) fn in_name(name: &str) -> Option<Decimal> {
-        let mut words = name.split(|c: char| !c.is_alphabetic());
-        match words.rfind(|word| !word.is_empty())? {
-            "s" | "sec" | "seconds" => Some(Decimal::Second),
-            "ms" | "msec" | "milliseconds" => Some(Decimal::Millisecond),
-            "us" | "\u{b5}s" | "\u{3bc}s" | "usec" | "microseconds" => Some(Decimal::Microsecond),
-            "ns" | "nsec" | "nanoseconds" => Some(Decimal::Nanosecond),
-            _ => None,
-        }
-    }
-
-    /// Its symbol, as it is written on the command line.
-    pub fn symbol(self) -> &'static str {
-        match self {
-            Decimal::Second => "s",
-            Decimal::Millisecond => "ms",
-            Decimal::Microsecond => "us",
-            Decimal::Nanosecond => "ns",
-        }
-    }
-
-    /// How many make a second.
-    pub fn per_second(self) -> i64 {
-        match self {
-            Decimal::Second => 1,
-            Decimal::Millisecond => 1_000,
-            Decimal::Microsecond => 1_000_000,
-            Decimal::Nanosecond => 1_000_000_000,
-        }
-    }
-}
-
-impl FromStr for Decimal {
-    type Err = Error;
-
-    fn from_str(text: &str) -> Result<Self, Error> {
-        let text = if text == "µs" { "us" } else { text };
-        let known = Decimal::ALL.into_iter().find(|unit| unit.symbol() == text);
-        known.ok_or_else(|| {
-            let problem = format!("{} is not a unit of time stamps", shorten(text.as_bytes()));
-            Error::new("unit of the times", problem, "give s, ms, us or ns")
-        })
-    }
-}
-
-impl fmt::Display for Decimal {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Decimal::Second => "seconds",
-            Decimal::Millisecond => "milliseconds",
-            Decimal::Microsecond => "microseconds",
-            Decimal::Nanosecond => "nanoseconds",
-        })
-    }
-}
-
 /// Seconds since 1970, from 2001 on: nothing else that is counted in seconds is as large.
 const EPOCH_S: std::ops::Range<f64> = 1e9..4.1e9;
 
@@ -297,7 +204,7 @@ impl Unit {
             [unit] => Ok(unit),
             [coarse, fine] if coarse_lasts_s(&coarse) > LONGEST_S => Ok(fine),
             [coarse, fine] => {
-                let named = seen.name.and_then(Decimal::in_name);
+                let named = seen.name.and_then(clock_unit_behind);
                 let named = named.filter(|unit| all.contains(unit));
                 named.ok_or([fine, coarse])
             }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use proptest::prelude::*;
 
-use super::*;
+use super::super::*;
 use crate::error::{Error, Result};
 use crate::tests::says;
 
@@ -273,7 +273,7 @@ fn an_error_of_the_consumer_ends_the_reading() {
         let recording = Recording::open(&path).unwrap();
         let error = recording
             .in_pieces(
-                1 << 10,
+                100,
                 10,
                 |_| (),
                 |_| {

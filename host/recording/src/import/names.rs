@@ -1,0 +1,416 @@
+//! What the name of a column means: by the words that loggers use.
+//!
+//! A name is cut into words at capitals, digits and signs, and joined again without its axis: `GyroX(dps)`, `Gyr_X`, `angular_velocity.x` have the stems
+//! `gyro`, `gyr` and `angularvelocity`. A stem is of the sensor whose word it is, begins or ends with, unless another part of it says that it is
+//! something else.
+
+use super::name_words::{TIME, is_in, words};
+use super::unit_names::{is_unit_of_time, is_unit_word};
+
+/// Meaning of a column's name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Meaning {
+    /// Time stamps.
+    Time,
+    /// Nanoseconds beside whole seconds, as ROS writes them.
+    Nanoseconds,
+    /// Axis of the gyro.
+    Gyro(usize),
+    /// Axis of the accelerometer.
+    Accel(usize),
+    /// An axis of the sensor that the file is named after.
+    Axis(usize),
+    /// A thermometer.
+    Temperature,
+    /// Number or label of a dwell.
+    Step,
+    /// A running number. It is no time: a logger may count from any rate.
+    Counter,
+    /// A known input of a table, by the recording's own name.
+    Reference(&'static str),
+    /// Something else that loggers write: a magnetometer, an attitude, a force without gravity.
+    Other,
+}
+
+/// Words of a gyro. Short ones only count alone: `w` is of ADI and many papers, `g` of InvenSense's examples, `gy` of the first sketch for an MPU-6050,
+/// and `wrss` is EuRoC's `w_RS_S_x`.
+const GYRO: &str =
+    "gyro gyr giro angularvelocity angvel deltaangle rotation rate omega gy w g gr wrss";
+/// Words of an accelerometer: `linearacceleration` is ROS's, with gravity despite its name, `accelerationincludinggravity` that of browsers, `xl` of ST.
+const ACCEL: &str = "accel acceleration acc acel linearacceleration accelerationincludinggravity beschleunigung force \
+    deltavelocity a f ac sf acl xl arss";
+/// What is neither, though it may contain a word of one: magnetometers, attitudes, forces without gravity, satellites, motors.
+const OTHER: &str = "mag quat orient euler gravity user linacc lin roll pitch yaw heading angle attitude baro press humid alt lat lon gps vel pos \
+    covariance cov variance motor servo setpoint debug volt current flag status valid accuracy bias filtered norm vector";
+/// Letters before an axis that mean no inertial sensor: magnetometer, quaternion, velocity, position, attitude, field.
+const OTHER_LETTERS: &str = "m q v p h b e u n";
+const NANOSECONDS: &str = "nsec nsecs nanosec nanosecs nanoseconds";
+const TEMPERATURE: &str = "temp temperature tmp";
+const STEP: &str = "step pose label position segment";
+const COUNTER: &str = "index idx sample samples counter count cnt ctr packetcounter packet seq sequence frame n no nr row id loopiteration iteration num number";
+/// Rates that are named after their angle: `roll_rate`, MAVLink's `pitchspeed`.
+const OF_AN_ANGLE: &str = "rate rates speed dot vel velocity angularrate gyro";
+/// Words that say nothing: units, and what every logger may write.
+const EMPTY: &str = "dps mdps rad mrad deg rads degs radps degps rps mps mps2 ms2 mg gs mss raw imu sensor body b data value val field msg";
+/// The name without its unit: what stands in brackets, unless it is an index, and units behind it.
+fn without_unit(name: &str) -> String {
+    let mut bare = String::new();
+    let mut rest = name.trim();
+    while let Some(open) = rest.find(['(', '[', '{']) {
+        bare.push_str(&rest[..open]);
+        let inner = &rest[open + 1..];
+        let close = inner.find([')', ']', '}']).unwrap_or(inner.len());
+        let text = inner[..close].trim();
+        if text.len() == 1
+            && text
+                .chars()
+                .all(|c| c.is_ascii_digit() || "xyzXYZ".contains(c))
+        {
+            bare.push('_');
+            bare.push_str(text);
+        }
+        rest = inner.get(close + 1..).unwrap_or_default();
+    }
+    bare.push_str(rest);
+    // `gyrox rad/s`
+    let kept: Vec<&str> = bare
+        .split_whitespace()
+        .filter(|word| !is_unit_word(word))
+        .collect();
+    kept.join(" ")
+}
+
+/// The sensor of a stem.
+fn sensor(stem: &str) -> Option<fn(usize) -> Meaning> {
+    if is_in(GYRO, stem) != is_in(ACCEL, stem) {
+        return Some(if is_in(GYRO, stem) {
+            Meaning::Gyro
+        } else {
+            Meaning::Accel
+        });
+    }
+    // A longer name that begins or ends with a sensor's word. What is left of it may say that it is something else: `userAcceleration`.
+    let longest = |list: &str| {
+        let long = list.split_whitespace().filter(|word| word.len() > 2);
+        let rests = long.filter_map(|word| stem.strip_suffix(word).or(stem.strip_prefix(word)));
+        rests.min_by_key(|rest| rest.len()).map(str::to_owned)
+    };
+    match (longest(GYRO), longest(ACCEL)) {
+        (Some(rest), None) if !is_other(&rest) => Some(Meaning::Gyro),
+        (None, Some(rest)) if !is_other(&rest) => Some(Meaning::Accel),
+        // `accelRate`
+        (Some(_), Some(rest)) if rest == "rate" => Some(Meaning::Accel),
+        _ => None,
+    }
+}
+
+/// The axis that a word is, or that it ends or begins with behind or before a sensor's word: `x`, `gx`, `xgyro`, `0`.
+fn axis_of(words: &[String]) -> Option<(usize, String)> {
+    let axes = ["x", "y", "z"];
+    let plain = |word: &str| axes.iter().position(|a| *a == word);
+    // A word of its own, from the end on.
+    if let Some((at, axis)) = (0..words.len())
+        .rev()
+        .find_map(|k| Some((k, plain(&words[k])?)))
+    {
+        let mut others = words.to_vec();
+        others.remove(at);
+        return Some((axis, others.concat()));
+    }
+    // `gx`, `xgyro`, also with the number of a sensor behind them: `gx1`.
+    let index = |w: &String| ["0", "1", "2"].iter().position(|i| i == w);
+    let numbered = words.len() > 1 && words.last().and_then(index).is_some();
+    let named = &words[..words.len() - usize::from(numbered)];
+    let all = named.concat();
+    let known = |stem: &str| is_in(OTHER, stem) || !is_other(&all) && sensor(stem).is_some();
+    let last = all.chars().next_back()?;
+    let stem = &all[..all.len() - last.len_utf8()];
+    if let Some(axis) = plain(&last.to_string()).filter(|_| known(stem)) {
+        return Some((axis, stem.to_owned()));
+    }
+    let first = all.chars().next()?;
+    let stem = &all[first.len_utf8()..];
+    if let Some(axis) = plain(&first.to_string()).filter(|_| known(stem)) {
+        return Some((axis, stem.to_owned()));
+    }
+    let axis = words.last().and_then(index).filter(|_| numbered)?;
+    Some((axis, all))
+}
+
+/// Drops what says nothing, and the numbers of sensors.
+fn essential(mut words: Vec<String>) -> Vec<String> {
+    let index = |w: &str| w.chars().all(|c| c.is_ascii_digit());
+    // The axis of `gyro_x_rad_s` stands before its unit.
+    let axis = words
+        .iter()
+        .position(|w| ["x", "y", "z"].contains(&w.as_str()));
+    if let Some(at) = axis.filter(|at| *at > 0) {
+        words.truncate(at + 1);
+    }
+    let kept: Vec<String> = words.iter().filter(|w| !is_in(EMPTY, w)).cloned().collect();
+    let kept = if kept.is_empty() { words } else { kept };
+    // `imu0.accel.x`, but `gyro[0]` and `0` stay.
+    let last = kept.len().saturating_sub(1);
+    let kept = kept.into_iter().enumerate();
+    kept.filter(|(k, w)| *k == last || !index(w))
+        .map(|(_, w)| w)
+        .collect()
+}
+
+/// The meaning of `name`.
+pub(super) fn meaning(name: &str) -> Meaning {
+    let exact = name.trim();
+    if let Some(reference) = crate::columns::Column::from_name(exact)
+        .filter(|_| exact.starts_with("ref_"))
+        .map(|column| column.name())
+    {
+        return Meaning::Reference(reference);
+    }
+    let all = words(&without_unit(exact));
+    let essential = essential(all.clone());
+    let whole = essential.concat();
+    if let ([_], Some(axis)) = (&all[..], ["p", "q", "r"].iter().position(|a| *a == whole)) {
+        return Meaning::Gyro(axis);
+    }
+    if let Some(axis) = rate_of_an_angle(&essential) {
+        return Meaning::Gyro(axis);
+    }
+    // `ax_g`, but `g_x` and `x_g` may be those of a gyro.
+    if let [of @ .., unit] = &essential[..]
+        && unit == "g"
+        && let Some((axis, stem)) = axis_of(of)
+        && is_in(ACCEL, &stem)
+    {
+        return Meaning::Accel(axis);
+    }
+    if let Some((axis, stem)) = axis_of(&essential) {
+        return match stem.is_empty() {
+            true => Meaning::Axis(axis),
+            false => sensor(&stem).map_or(Meaning::Other, |sensor| sensor(axis)),
+        };
+    }
+    let last = essential.last().map_or("", String::as_str);
+    let is_time = |word: &String| word.len() > 2 && is_in(TIME, word);
+    match whole.as_str() {
+        _ if is_in(NANOSECONDS, last) => Meaning::Nanoseconds,
+        whole if is_in(STEP, whole) => Meaning::Step,
+        "tempc" => Meaning::Temperature,
+        _ if TEMPERATURE
+            .split_whitespace()
+            .any(|word| last.ends_with(word)) =>
+        {
+            Meaning::Temperature
+        }
+        whole if is_in(COUNTER, whole) => Meaning::Counter,
+        whole if is_in(TIME, whole) || is_in(TIME, &all.concat()) => Meaning::Time,
+        _ if is_short_time(&all) || essential.iter().any(is_time) => Meaning::Time,
+        _ => Meaning::Other,
+    }
+}
+
+/// `t_ms`, `ts [us]`: a letter or two with a unit of time.
+fn is_short_time(words: &[String]) -> bool {
+    matches!(words, [first, rest @ ..] if ["t", "ts"].contains(&first.as_str()) && rest.iter().all(|w| is_unit_of_time(w)))
+}
+/// Whether `name` has the seconds of the stamp whose nanoseconds are in `nanoseconds`: `header.stamp.secs` and `header.stamp.nsecs`.
+pub(super) fn are_seconds_of(name: &str, nanoseconds: &str) -> bool {
+    let [name, nanoseconds] = [name, nanoseconds].map(words);
+    match (name.split_last(), nanoseconds.split_last()) {
+        (Some((last, of)), Some((_, stamp))) => {
+            of == stamp && ["s", "sec", "secs", "second", "seconds"].contains(&last.as_str())
+        }
+        _ => false,
+    }
+}
+
+/// The axis of a rate that is named after its angle.
+fn rate_of_an_angle(words: &[String]) -> Option<usize> {
+    let joined = words.concat();
+    let rest = |angle: &&str| joined.strip_prefix(*angle).or(joined.strip_suffix(*angle));
+    let is_rate = |angle: &&str| rest(angle).is_some_and(|rest| is_in(OF_AN_ANGLE, rest));
+    ["roll", "pitch", "yaw"].iter().position(is_rate)
+}
+
+/// Three of `names` that differ in nothing but x, y and z, and mean nothing that is known: where they are, and what they have in common.
+pub(super) fn unknown_triad(names: &[String]) -> Option<([usize; 3], String)> {
+    let lower: Vec<String> = names.iter().map(|name| name.to_lowercase()).collect();
+    for (first, name) in lower.iter().enumerate() {
+        for (at, _) in name.match_indices('x') {
+            let (before, behind) = (&name[..at], &name[at + 1..]);
+            let on = |axis: char| {
+                let other = format!("{before}{axis}{behind}");
+                lower.iter().position(|name| *name == other)
+            };
+            let letter = |c: &char| c.is_alphabetic();
+            let stem: String = before
+                .chars()
+                .chain(behind.chars())
+                .filter(letter)
+                .collect();
+            let known = stem.is_empty()
+                || is_in(OTHER_LETTERS, &stem)
+                || is_other(&stem)
+                || meaning(&names[first]) != Meaning::Other;
+            if let (false, Some(y), Some(z)) = (known, on('y'), on('z')) {
+                return Some(([first, y, z], stem));
+            }
+        }
+    }
+    None
+}
+
+/// Whether `name` contains a word of something that is neither a time nor an inertial sensor.
+pub(super) fn is_other(name: &str) -> bool {
+    let name = name.to_lowercase();
+    OTHER.split_whitespace().any(|word| name.contains(word))
+}
+
+/// Whether a word of `name` is one of a running number.
+pub(super) fn is_number(name: &str) -> bool {
+    words(name).iter().any(|word| is_in(COUNTER, word))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn axes_of_both_sensors_are_known_by_the_names_that_loggers_write() {
+        for (name, wanted) in [
+            ("ax", Meaning::Accel(0)),
+            ("gz", Meaning::Gyro(2)),
+            ("wx", Meaning::Gyro(0)),
+            ("fy", Meaning::Accel(1)),
+            ("acc_x", Meaning::Accel(0)),
+            ("AccX(g)", Meaning::Accel(0)),
+            ("A_X [mg]", Meaning::Accel(0)),
+            ("G_Z [mdps]", Meaning::Gyro(2)),
+            ("linear_acceleration.x", Meaning::Accel(0)),
+            ("angular_velocity.y", Meaning::Gyro(1)),
+            ("field.angular_velocity.y", Meaning::Gyro(1)),
+            ("p", Meaning::Gyro(0)),
+            ("q", Meaning::Gyro(1)),
+            ("r", Meaning::Gyro(2)),
+            ("gyroADC[0]", Meaning::Gyro(0)),
+            ("accSmooth[2]", Meaning::Accel(2)),
+            ("imu.gyro.x", Meaning::Gyro(0)),
+            ("Gx [°/s]", Meaning::Gyro(0)),
+            ("AcX", Meaning::Accel(0)),
+            ("GyZ", Meaning::Gyro(2)),
+            ("giro_x", Meaning::Gyro(0)),
+            ("aceleración_z", Meaning::Accel(2)),
+            ("Gyroscope x (rad/s)", Meaning::Gyro(0)),
+            ("Acceleration z (m/s^2)", Meaning::Accel(2)),
+            ("Gyr_X", Meaning::Gyro(0)),
+            ("xacc", Meaning::Accel(0)),
+            ("zgyro", Meaning::Gyro(2)),
+            ("gyro_x_rad_s", Meaning::Gyro(0)),
+            ("accel_y_mps2", Meaning::Accel(1)),
+            ("IMU0.AccelX", Meaning::Accel(0)),
+            ("rotationRate.x", Meaning::Gyro(0)),
+            ("x-axis angular velocity", Meaning::Gyro(0)),
+            ("gx1", Meaning::Gyro(0)),
+            ("gyrox rad/s", Meaning::Gyro(0)),
+            ("gy1", Meaning::Gyro(1)),
+            ("az2", Meaning::Accel(2)),
+            ("x", Meaning::Axis(0)),
+            ("ACCx", Meaning::Accel(0)),
+            ("gyro_x", Meaning::Gyro(0)),
+            ("GYRO_Z", Meaning::Gyro(2)),
+            ("Accelerometer X", Meaning::Accel(0)),
+            ("omega_z", Meaning::Gyro(2)),
+            ("accelerometer_m_s2[1]", Meaning::Accel(1)),
+            ("gyro_rad[0]", Meaning::Gyro(0)),
+            ("RawAccelY", Meaning::Accel(1)),
+            ("ax(g)", Meaning::Accel(0)),
+            ("gx_dps", Meaning::Gyro(0)),
+            ("Gyro X (deg/s)", Meaning::Gyro(0)),
+            ("w_x", Meaning::Gyro(0)),
+            ("w_RS_S_x [rad s^-1]", Meaning::Gyro(0)),
+            ("a_RS_S_z [m s^-2]", Meaning::Accel(2)),
+            ("sensor_accel.x", Meaning::Accel(0)),
+            ("ax_g", Meaning::Accel(0)),
+            ("accZ_g", Meaning::Accel(2)),
+            ("Ay_mg", Meaning::Accel(1)),
+            ("Gz_mdps", Meaning::Gyro(2)),
+            ("gx_rps", Meaning::Gyro(0)),
+            ("roll_rate", Meaning::Gyro(0)),
+            ("pitchspeed", Meaning::Gyro(1)),
+            ("YawRate (deg/s)", Meaning::Gyro(2)),
+        ] {
+            assert_eq!(meaning(name), wanted, "{name}: {:?}", words(name));
+        }
+    }
+
+    #[test]
+    fn times_counters_thermometers_and_what_is_no_input_are_told_apart() {
+        for (name, wanted) in [
+            ("t", Meaning::Time),
+            ("t_ms", Meaning::Time),
+            ("Time (ms)", Meaning::Time),
+            ("timestamp_us", Meaning::Time),
+            ("SampleTimeFine", Meaning::Time),
+            ("seconds_elapsed", Meaning::Time),
+            ("TimeUS", Meaning::Time),
+            ("#timestamp [ns]", Meaning::Time),
+            ("header.stamp.sec", Meaning::Time),
+            ("header.stamp.nanosec", Meaning::Nanoseconds),
+            ("time", Meaning::Time),
+            ("Timestamp", Meaning::Time),
+            ("millis", Meaning::Time),
+            ("Elapsed (s)", Meaning::Time),
+            ("DateTime", Meaning::Time),
+            ("PacketCounter", Meaning::Counter),
+            ("index", Meaning::Counter),
+            ("loopIteration", Meaning::Counter),
+            ("seq", Meaning::Counter),
+            ("Temperature", Meaning::Temperature),
+            ("Tmp", Meaning::Temperature),
+            ("imu_temp", Meaning::Temperature),
+            ("Temp (°C)", Meaning::Temperature),
+            ("label", Meaning::Step),
+            ("step", Meaning::Step),
+            ("mag_x", Meaning::Other),
+            ("qw", Meaning::Other),
+            ("roll", Meaning::Other),
+            ("roll_rate_setpoint", Meaning::Other),
+            ("Mx", Meaning::Other),
+            ("orientation.x", Meaning::Other),
+            ("userAcceleration.x", Meaning::Other),
+            ("gravity.x", Meaning::Other),
+            ("velocity_x", Meaning::Other),
+            ("ref_rate_x_dps", Meaning::Reference("ref_rate_x_dps")),
+            ("motor[0]", Meaning::Other),
+            ("setpoint[1]", Meaning::Other),
+            ("altitude", Meaning::Other),
+            ("orientation_covariance[0]", Meaning::Other),
+            ("angle_x", Meaning::Other),
+            ("Humidity", Meaning::Other),
+        ] {
+            assert_eq!(meaning(name), wanted, "{name}: {:?}", words(name));
+        }
+    }
+
+    #[test]
+    fn a_triad_of_an_unknown_word_is_noticed() {
+        let triad = |name: &str| {
+            let names = ["x", "z", "y"].map(|axis| name.replace('*', axis));
+            unknown_triad(&names)
+        };
+        for (name, stem) in [("foo_*", "foo"), ("R*", "r"), ("g*_foo", "gfoo")] {
+            assert_eq!(triad(name), Some(([0, 2, 1], stem.into())), "{name}");
+        }
+        for name in [
+            "*",
+            "gyro_*",
+            "mag_*",
+            "M*",
+            "q_*",
+            "orientation.*",
+            "g*_dps",
+        ] {
+            assert_eq!(triad(name), None, "{name}");
+        }
+        assert_eq!(unknown_triad(&["foo_x".into(), "foo_y".into()]), None);
+    }
+}
