@@ -122,7 +122,10 @@ fn axis_of(words: &[String]) -> Option<(usize, String)> {
     let numbered = words.len() > 1 && words.last().and_then(index).is_some();
     let named = &words[..words.len() - usize::from(numbered)];
     let all = named.concat();
-    let known = |stem: &str| is_in(OTHER, stem) || !is_other(&all) && sensor(stem).is_some();
+    // `accuracy` is no `acc` with an axis behind it.
+    let in_whole = |word: &str, stem: &str| all.contains(word) && !stem.contains(word);
+    let other = |stem: &str| OTHER.split_whitespace().any(|word| in_whole(word, stem));
+    let known = |stem: &str| is_in(OTHER, stem) || sensor(stem).is_some() && !other(stem);
     let last = all.chars().next_back()?;
     let stem = &all[..all.len() - last.len_utf8()];
     if let Some(axis) = plain(&last.to_string()).filter(|_| known(stem)) {
@@ -311,6 +314,8 @@ mod tests {
             ("x-axis angular velocity", Meaning::Gyro(0)),
             ("gx1", Meaning::Gyro(0)),
             ("gyrox rad/s", Meaning::Gyro(0)),
+            ("angularvelocityx", Meaning::Gyro(0)),
+            ("imulinearaccelerationz", Meaning::Accel(2)),
             ("gy1", Meaning::Gyro(1)),
             ("az2", Meaning::Accel(2)),
             ("x", Meaning::Axis(0)),
@@ -385,6 +390,7 @@ mod tests {
             ("altitude", Meaning::Other),
             ("orientation_covariance[0]", Meaning::Other),
             ("angle_x", Meaning::Other),
+            ("accuracy", Meaning::Other),
             ("Humidity", Meaning::Other),
         ] {
             assert_eq!(meaning(name), wanted, "{name}: {:?}", words(name));
