@@ -68,8 +68,6 @@ pub struct Design {
     /// Geometric mean of the semi-axes of the parameters' one-sigma ellipsoid, normalised: SI unit of the sensor at full input. Infinite
     /// if singular.
     pub mean_sigma: f64,
-    /// The same, over the geometric mean of the axes' full inputs.
-    pub mean_sigma_of_full_scale: f64,
     /// Names of the parameters that it does not determine.
     pub undetermined: Vec<String>,
     /// Residual degrees of freedom.
@@ -247,8 +245,6 @@ impl Design {
             condition: judgement.condition,
             sigma_per_parameter: parameters.collect(),
             mean_sigma: judgement.mean_sigma,
-            // Geometric mean of the spans, in which the ranges of all axes count alike.
-            mean_sigma_of_full_scale: judgement.mean_sigma / model.span.product().cbrt(),
             undetermined: judgement.undetermined(),
             dof: Freedom {
                 lack_of_fit: judgement.lack_of_fit_dof,

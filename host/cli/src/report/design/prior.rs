@@ -1,11 +1,11 @@
 //! What a prior adds to a design.
 
 use maud::{Markup, html};
-use mimu::plan::design::fewest::MOST;
+use mimu::plan::design::fewest::{MOST, Widths};
 use mimu::quantity::{plural, significant};
 use mimu::readable;
 use mimu::result::design::Design;
-use mimu::result::design::beside_population::{BesidePopulation, HalfWidths};
+use mimu::result::design::beside_population::BesidePopulation;
 
 use crate::report::page::Level;
 use crate::report::table::{number, table};
@@ -51,12 +51,12 @@ pub(super) fn alone(half: f64) -> String {
 const NAMES: [&str; 3] = ["bias, mg", "scale, ppm", "angle, µrad"];
 
 /// Half-widths in the units of data sheets, as in [`NAMES`].
-fn cells(widths: &HalfWidths) -> [Markup; 3] {
+fn cells(widths: &Widths) -> [Markup; 3] {
     let bias = readable::parameter("m/s^2").factor;
     [
-        (widths.bias_mps2, bias),
+        (widths.bias, bias),
         (widths.scale, 1e6),
-        (widths.angle_rad, 1e6),
+        (widths.angle, 1e6),
     ]
     .map(|(si, factor)| match si.is_finite() {
         true => number(si, factor),

@@ -1,18 +1,22 @@
 //! Half-widths that a design predicts, and the fewest dwells that suffice.
 
+use serde::Serialize;
+
 use super::judgement::{Determined, Judgement};
 use super::problem::Problem;
 use crate::observation::{LOWER, place};
 use mimu_recording::NORMAL_95;
 
-/// Largest half-widths of 95 % intervals, if the noise is known, by kind of parameter. Infinite if one is not determined.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// Largest half-widths of 95 % intervals, if the noise is known, by kind of parameter. Infinite, null in JSON, if one is not determined.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Widths {
     /// Biases, m/s².
+    #[serde(rename = "bias_mps2")]
     pub bias: f64,
     /// Scale factors, relative.
     pub scale: f64,
     /// Angles between the axes, rad.
+    #[serde(rename = "angle_rad")]
     pub angle: f64,
 }
 

@@ -39,39 +39,18 @@ pub struct ByDwells {
     /// Number of dwells; 0: the population alone.
     pub dwells: usize,
     /// With the prior.
-    pub with: HalfWidths,
+    pub with: Widths,
     /// Without it; `None` if these dwells alone do not determine the parameters.
-    pub without: Option<HalfWidths>,
-}
-
-/// Largest half-widths of the 95 % intervals if the noise is known, by kind of parameter; infinite, null in JSON, if one is not determined.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct HalfWidths {
-    /// Biases, m/s².
-    pub bias_mps2: f64,
-    /// Scale factors, relative.
-    pub scale: f64,
-    /// Angles between axes, rad.
-    pub angle_rad: f64,
+    pub without: Option<Widths>,
 }
 
 /// Half-widths that were sought.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Sought {
     /// The targets.
-    pub half_widths: HalfWidths,
+    pub half_widths: Widths,
     /// Fewest dwells that meet them without the prior; `None` if more than [`crate::plan::design::fewest::MOST`].
     pub dwells_without: Option<usize>,
-}
-
-impl From<&Widths> for HalfWidths {
-    fn from(of: &Widths) -> Self {
-        Self {
-            bias_mps2: of.bias,
-            scale: of.scale,
-            angle_rad: of.angle,
-        }
-    }
 }
 
 impl Design {
@@ -87,12 +66,12 @@ impl Design {
         };
         let sigma = self.dwell_sigma.value;
         let (with, without) = (problem.at_sigma(sigma), problem.alone());
-        let widths = |problem: &Problem, n: usize| -> Option<HalfWidths> {
+        let widths = |problem: &Problem, n: usize| -> Option<Widths> {
             let settings = match n {
                 0 => Vec::new(),
                 _ => problem.best(n, seed).ok()?,
             };
-            Some((&Widths::of(&problem.judge(&settings, sigma))).into())
+            Some(Widths::of(&problem.judge(&settings, sigma)))
         };
         let numbers = std::iter::once(0).chain(with.fewest()..=LISTED);
         let by_dwells = numbers.filter_map(|dwells| {
@@ -117,7 +96,7 @@ impl Design {
             dwells_without: without.fewest_with(sigma, seed, as_good),
             by_dwells: by_dwells.collect(),
             targets: targets.map(|targets| Sought {
-                half_widths: targets.into(),
+                half_widths: *targets,
                 dwells_without: without
                     .fewest_with(sigma, seed, |found| Widths::of(found).meet(targets)),
             }),

@@ -79,31 +79,29 @@ fn true_over_claimed(settings: &[Setting]) -> f64 {
     (1..4).map(|k| truth[(k, k)] / claimed[(k, k)]).sum::<f64>() / 3.0
 }
 
-/// The next dwell is always the nearest: an order with short moves.
-fn nearest_first(settings: &[Setting]) -> Vec<Setting> {
-    let mut left = settings.to_vec();
-    let mut order = vec![left.remove(0)];
-    while !left.is_empty() {
-        let off = |s: &Setting| order.last().unwrap().up.angle(&s.up);
-        let near = (0..left.len()).min_by(|a, b| off(&left[*a]).total_cmp(&off(&left[*b])));
-        order.push(left.remove(near.unwrap()));
-    }
+/// An order in which neighbours are similar: by z, then y, then x.
+fn listed(settings: &[Setting]) -> Vec<Setting> {
+    let mut order = settings.to_vec();
+    let key = |s: &Setting| [s.up.z, s.up.y, s.up.x].map(|c| (c * 1e6).round() as i64);
+    order.sort_by_key(key);
     order
 }
 
 #[test]
-fn in_an_order_by_lot_drift_is_scatter_that_a_fit_knows_of_and_in_an_order_with_short_moves_it_is_not()
- {
+fn in_an_order_by_lot_drift_is_scatter_that_a_fit_knows_of_and_in_a_listed_order_it_is_not() {
     let problem = accel(Reference::Table);
     for n in [9, 12, 22] {
         let settings = problem.best(n, 1).unwrap();
-        let short = true_over_claimed(&nearest_first(&settings));
+        let listed = true_over_claimed(&listed(&settings));
         let lots = (0..2000).map(|seed| true_over_claimed(&randomised(&settings, seed)));
         let randomised = lots.sum::<f64>() / 2000.0;
         println!(
-            "{n} dwells: true over claimed variance {short:.2} with short moves, {randomised:.2} in a randomised order"
+            "{n} dwells: true over claimed variance {listed:.2} in a listed order, {randomised:.2} in a randomised one"
         );
-        assert!(short > 1.5 && randomised < 1.2, "{n}: {short} {randomised}");
+        assert!(
+            listed > 1.5 && randomised < 1.2,
+            "{n}: {listed} {randomised}"
+        );
     }
 }
 
