@@ -189,7 +189,7 @@ mod tests {
     fn each_process_has_the_variance_of_its_power_law() {
         for kind in [Deviation::Allan, Deviation::Hadamard] {
             for m in [1, 3, 8, 1000] {
-                let d = over(order, m);
+                let d = over(kind, m);
                 for (c, known) in cross(d, d, 0).iter().zip(d.basis()) {
                     assert!((c / known - 1.0).abs() < 1e-9, "{d:?}: {c} {known}");
                 }
