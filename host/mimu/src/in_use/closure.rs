@@ -23,7 +23,7 @@ pub(super) enum Share {
 }
 
 /// All of them, in the order of [`Closure::shares`].
-pub(super) const SHARES: [Share; 8] = [
+const SHARES: [Share; 8] = [
     Share::White(Sensor::Gyro),
     Share::White(Sensor::Accel),
     Share::Shaken(Sensor::Gyro),
@@ -118,6 +118,12 @@ impl Closure {
             turned: reckoned.turned,
             vibration: reckoned.vibration / reckoned.duration_s,
         }
+    }
+
+    /// The covariance of a share at a value of 1.
+    pub fn share(&self, share: Share) -> &DMatrix<f64> {
+        let at = SHARES.iter().position(|s| *s == share);
+        &self.shares[at.unwrap_or(0)]
     }
 
     /// The errors of the whole state, given those that remain without the `biases` and the mounting and clock of `about`.

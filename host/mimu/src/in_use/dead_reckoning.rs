@@ -34,7 +34,7 @@ pub(super) struct DeadReckoning {
     pub vibration: f64,
     /// Derivatives of attitude, velocity, position and marked position by the state.
     pub by: ErrorsBy,
-    /// Covariances of the same: by white noise as the noise file has it, then by the first four of [`SHARES`](super::closure::SHARES).
+    /// Covariances of the same: by white noise as the noise file has it, then by the first four of the shares of a segment.
     pub gramians: [Errors; 5],
     /// Biases that are taken off the readings, rad/s and m/s².
     pub biases: PerSensor<Vector3<f64>>,

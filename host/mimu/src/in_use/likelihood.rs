@@ -5,7 +5,7 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Matrix3};
 
-use super::closure::{Closure, SHARES, scales};
+use super::closure::{Closure, scales};
 use super::component::{Component, Kind};
 use super::rests::EARTH;
 use super::smoothed::{Smoothed, SmoothedState};
@@ -185,8 +185,7 @@ impl Session {
             if let Kind::Share(share) = &component.kind
                 && *value > 0.0
             {
-                let at = SHARES.iter().position(|s| s == share).unwrap_or(0);
-                sum += &closure.shares[at] * (value * component.unit);
+                sum += closure.share(*share) * (value * component.unit);
             }
         }
         // Errors of rounding, and of the linearisation: 1 µrad, 1 µm/s.
@@ -200,10 +199,7 @@ impl Session {
     pub fn unlearned(&self, closure: &Closure, k: usize) -> DMatrix<f64> {
         let component = &self.components[k];
         match &component.kind {
-            Kind::Share(share) => {
-                let at = SHARES.iter().position(|s| s == share).unwrap_or(0);
-                &closure.shares[at] * component.unit
-            }
+            Kind::Share(share) => closure.share(*share) * component.unit,
             Kind::Matrix(sensor) => {
                 let by = scales(&closure.by, *sensor, &self.matrices[*sensor]);
                 &by * by.transpose() * component.unit

@@ -4,8 +4,9 @@ use super::likelihood::{Model, Session};
 use super::mounted::SIGMAS;
 use crate::judgement::Judgement;
 use crate::noise::noise_file::{FileCoefficient, NoiseChannel, NoiseFile};
-use crate::quantity::{AXES, Sensor};
+use crate::quantity::Sensor;
 use mimu_allan::model::Term;
+use mimu_recording::RAW_COLUMNS;
 
 /// The noise at rest with what motion adds to every axis.
 pub(super) fn of(
@@ -63,8 +64,6 @@ pub(super) fn of(
 }
 
 fn place(channel: &NoiseChannel) -> Option<(Sensor, usize)> {
-    let (sensor, axis) = channel.name.split_once('_')?;
-    let sensor = Sensor::BOTH.into_iter().find(|s| s.to_string() == sensor)?;
-    let axis = AXES.iter().position(|a| *a == axis)?;
-    Some((sensor, axis))
+    let at = RAW_COLUMNS.iter().position(|name| *name == channel.name)?;
+    Some((Sensor::BOTH[at / 3], at % 3))
 }
