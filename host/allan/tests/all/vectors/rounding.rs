@@ -2,7 +2,7 @@
 //! without rounding.
 
 use mimu_allan::curve::curve;
-use mimu_allan::deviation::{ALL_TERMS, Integrated};
+use mimu_allan::deviation::ALL_TERMS;
 use mimu_allan::{Deviation, Point, Spacing};
 
 use super::Random;
