@@ -9,6 +9,8 @@ use super::Study;
 const UNIT: f64 = 1e-4;
 /// Smallest repeatability, a variance of standard values: the inverse of a block would have no end.
 const LEAST: f64 = 1e-12;
+/// A variance whose absence lowers the logarithm of the likelihood by less is zero: its own would have no curvature, and the others no intervals.
+const FLAT: f64 = 1e-6;
 /// Smallest step of the search in the logarithm of a variance.
 const FINEST: f64 = 1e-3;
 
@@ -103,7 +105,17 @@ impl Model<'_> {
         };
         let start = search.fitted(vec![1.0 / (UNIT * count as f64); count]);
         let all: Vec<usize> = (0..count).collect();
-        variances(&search.maximise(start, &all).values)
+        let mut best = search.maximise(start, &all);
+        // Repeatability is never zero.
+        for k in 1..count {
+            let mut values = best.values.clone();
+            values[k] = 0.0;
+            let without = search.fitted(values);
+            if without.log_likelihood > best.log_likelihood - FLAT {
+                best = without;
+            }
+        }
+        variances(&best.values)
     }
 
     /// Covariance of the logarithms: the inverse of the observed information. A variance that is zero has none.

@@ -101,8 +101,15 @@ mod tests {
 
     /// How many of 60 units of nine sessions with eight parameters each have each course: constant, slope, walk, step.
     fn shares(of: impl Fn(usize, &mut dyn FnMut() -> f64) -> Vec<f64>) -> [usize; 4] {
-        let mut random = mimu_rig::random::Random::new(7, "course");
-        let mut normal = move || random.normal();
+        let mut state = 7_u64;
+        let mut even = move || {
+            state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+            let z = (state ^ (state >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+            let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+            ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        let mut normal =
+            move || (-2.0 * (1.0 - even()).ln()).sqrt() * (std::f64::consts::TAU * even()).cos();
         let mut counts = [0; 4];
         for _ in 0..60 {
             let columns: Vec<Vec<f64>> = (0..8).map(|k| of(k, &mut normal)).collect();
