@@ -221,7 +221,11 @@ pub(super) fn walk(
 impl Readings {
     /// Their mean, of sums over a time; nothing changes if that is none.
     pub fn mean(&self) -> Self {
-        let t = if self.duration_s > 0.0 { self.duration_s } else { 1.0 };
+        let t = if self.duration_s > 0.0 {
+            self.duration_s
+        } else {
+            1.0
+        };
         Self {
             rate: self.rate / t,
             force: self.force / t,

@@ -14,8 +14,8 @@ pub use crate::signal::moments::{Moments, Rails};
 use crate::signal::quantisation_step::QuantisationFinder;
 use crate::warning::Warning;
 use mimu_recording::error::{Argument, Error, Result};
-pub(crate) use mimu_recording::statistics::{OF_MEDIAN, quantile};
 use mimu_recording::health::{At, Finding, HeldReadings, SignedLowByteFinder, Temperatures};
+pub(crate) use mimu_recording::statistics::{OF_MEDIAN, quantile};
 use mimu_recording::{Batch, Column, RAW_COLUMNS, Recording};
 
 /// Length of a block, s: a tenth of the shortest usable dwell, ten samples at 100 Hz.
