@@ -211,7 +211,7 @@ pub fn reported(diagnosis: Diagnosis) -> Diagnosis {
         command: "mimu diagnose blind".into(),
         created: "2026-01-01T00:00:00Z".into(),
     };
-    let page = diagnosis_page(&report, &made).expect("a page");
+    let page = diagnosis_page(&report, &made);
     let text = diagnosis_text(
         &report,
         Detail {

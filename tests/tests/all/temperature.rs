@@ -307,11 +307,7 @@ fn the_interval_of_a_lag_is_in_the_json_the_text_and_the_page() {
         )
         .contains(&format!("(95 %: {interval})"))
     );
-    assert!(
-        diagnosis_page(&result, &made)
-            .expect("a page")
-            .contains(&interval)
-    );
+    assert!(diagnosis_page(&result, &made).contains(&interval));
 }
 
 /// A calibration of `file` from a short recording at one temperature.

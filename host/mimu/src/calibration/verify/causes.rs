@@ -140,6 +140,37 @@ fn unknowns(from: usize, symmetric: bool) -> [Vec<Vec<usize>>; 2] {
     [(from..from + 3).map(|k| vec![k]).collect(), of_a.collect()]
 }
 
+/// The errors of `sensor` in this recording; the first group is judged. `None` if nothing shows them.
+fn rows(
+    prepared: &Prepared,
+    sensor: Sensor,
+    model: &Affine<f64>,
+    accel: Option<&Affine<f64>>,
+) -> Option<Vec<Rows>> {
+    let own = [(sensor, model)];
+    Some(match (prepared.manifest.reference, sensor) {
+        (Reference::Table, _) => vec![known(prepared, sensor, model)?],
+        (Reference::Gravity | Reference::TurntableRate, Sensor::Accel) => {
+            Rows::of_groups(&prepared.magnitudes(model), &own)
+        }
+        (Reference::TurntableRate, Sensor::Gyro) => {
+            let dwells = RatedDwells::of(prepared).ok()?;
+            let mut factors = magnitudes(&dwells, model);
+            factors.rests(&dwells.rests);
+            Rows::of_groups(&factors, &own)
+        }
+        (Reference::Gravity, Sensor::Gyro) => {
+            let accel = accel?;
+            let (turns, _) = prepared.turns(accel);
+            let mut factors = Factors::of_turns(&turns);
+            factors.rests(&prepared.rest(accel));
+            factors.list.extend(prepared.magnitudes(accel).list);
+            let both = [(sensor, model), (Sensor::Accel, accel)];
+            (!turns.is_empty()).then(|| Rows::of_groups(&factors, &both))?
+        }
+    })
+}
+
 /// The causes of the errors of `sensor`; `None` if the recording does not distinguish them.
 pub(super) fn of(
     prepared: &Prepared,
@@ -147,25 +178,14 @@ pub(super) fn of(
     model: &Affine<f64>,
     accel: Option<&Affine<f64>>,
 ) -> Option<Causes> {
-    match (prepared.manifest.reference, sensor) {
-        (Reference::Table, _) => separate(&[known(prepared, sensor, model)?], &unknowns(0, false)),
-        (Reference::Gravity | Reference::TurntableRate, Sensor::Accel) => {
-            separate(&by_gravity(prepared, model), &unknowns(0, true))
-        }
-        (Reference::TurntableRate, Sensor::Gyro) => {
-            let dwells = RatedDwells::of(prepared).ok()?;
-            let mut factors = magnitudes(&dwells, model);
-            factors.rests(&dwells.rests);
-            let rows = Rows::of_groups(&factors, &[(Sensor::Gyro, model)]);
-            separate(&rows, &unknowns(0, true))
-        }
-        (Reference::Gravity, Sensor::Gyro) => {
-            let rows = by_directions(prepared, model, accel?)?;
-            let [bias, matrix] = unknowns(0, false);
-            let of_accel = unknowns(OF_TRIAD, true).concat();
-            separate(&rows, &[bias, matrix, of_accel])
-        }
+    let rows = rows(prepared, sensor, model, accel)?;
+    let by_turns = rows.first()?.design.ncols() > OF_TRIAD;
+    let known = prepared.manifest.reference == Reference::Table;
+    let mut causes = unknowns(0, !known && !by_turns).to_vec();
+    if by_turns {
+        causes.push(unknowns(OF_TRIAD, true).concat());
     }
+    separate(&rows, &causes)
 }
 
 /// Errors at known inputs.
@@ -211,29 +231,16 @@ pub(super) fn announced(
 ) -> Option<f64> {
     let model = calibration.inverse(sensor)?;
     let (own, sigmas) = of_errors(&model, uncertainty(sensor)?)?;
-    let mut of_accel = Covariance::zeros();
+    let accel = calibration.inverse(Sensor::Accel);
+    let rows = rows(prepared, sensor, &model, accel.as_ref())?
+        .into_iter()
+        .next()?;
+    let (n, triads) = (rows.design.nrows(), rows.design.ncols() / OF_TRIAD);
     // Errors of each observation: one for a magnitude, two for a turn.
-    let (rows, each) = match (prepared.manifest.reference, sensor) {
-        (Reference::Table, _) => (known(prepared, sensor, &model)?, 1.0),
-        (Reference::Gravity | Reference::TurntableRate, Sensor::Accel) => {
-            (by_gravity(prepared, &model).pop()?, 1.0)
-        }
-        (Reference::TurntableRate, Sensor::Gyro) => {
-            let dwells = RatedDwells::of(prepared).ok()?;
-            let factors = magnitudes(&dwells, &model);
-            (
-                Rows::of_groups(&factors, &[(Sensor::Gyro, &model)]).pop()?,
-                1.0,
-            )
-        }
-        (Reference::Gravity, Sensor::Gyro) => {
-            let accel = calibration.inverse(Sensor::Accel)?;
-            if let Some(known) = uncertainty(Sensor::Accel) {
-                of_accel = of_errors(&accel, known)?.0;
-            }
-            (by_directions(prepared, &model, &accel)?.swap_remove(0), 2.0)
-        }
-    };
+    let each = triads as f64;
+    let known = accel.zip(uncertainty(Sensor::Accel));
+    let of_accel = known.and_then(|(accel, known)| of_errors(&accel, known));
+    let of_accel = of_accel.map_or_else(Covariance::zeros, |known| known.0);
     // Of A of the accelerometer only the symmetric part counts.
     let transposed = |k: usize| match k {
         0..3 => k,
@@ -243,7 +250,6 @@ pub(super) fn announced(
         0.5 * (f64::from(u8::from(i == j)) + f64::from(u8::from(i == transposed(j))))
     });
     let parts = [own, symmetric * of_accel * symmetric];
-    let (n, triads) = (rows.design.nrows(), rows.design.ncols() / OF_TRIAD);
     let square = |(k, covariance): (usize, &Covariance)| {
         let by = rows.design.columns(OF_TRIAD * k, OF_TRIAD);
         (by * covariance).component_mul(&by).sum()
@@ -263,24 +269,6 @@ pub(super) fn of_errors(
         .transpose()
         .try_inverse()?;
     Some((by * covariance * by.transpose(), sigmas))
-}
-
-fn by_gravity(prepared: &Prepared, accel: &Affine<f64>) -> Vec<Rows> {
-    Rows::of_groups(&prepared.magnitudes(accel), &[(Sensor::Accel, accel)])
-}
-
-/// Directions after turns, rates at rest, and magnitudes of gravity. `None` without a turn.
-fn by_directions(
-    prepared: &Prepared,
-    gyro: &Affine<f64>,
-    accel: &Affine<f64>,
-) -> Option<Vec<Rows>> {
-    let (turns, _) = prepared.turns(accel);
-    let mut factors = Factors::of_turns(&turns);
-    factors.rests(&prepared.rest(accel));
-    factors.list.extend(prepared.magnitudes(accel).list);
-    let triads = [(Sensor::Gyro, gyro), (Sensor::Accel, accel)];
-    (!turns.is_empty()).then(|| Rows::of_groups(&factors, &triads))
 }
 
 /// Separates the mean square of the first group into what the unknowns of each cause explain: bias, matrix and, if there is a third, the accelerometer.
