@@ -12,7 +12,11 @@ use crate::triad::{Covariance, Triad};
 use crate::unseen::Unseen;
 
 /// Errors of `factors` by these calibrations, whose parameters have the covariance `root rootᵀ`.
-fn unseen(factors: &Factors, models: &[(Sensor, &Affine<f64>)], root: &DMatrix<f64>) -> Unseen {
+pub(crate) fn unseen(
+    factors: &Factors,
+    models: &[(Sensor, &Affine<f64>)],
+    root: &DMatrix<f64>,
+) -> Unseen {
     let values = factors.values(models);
     let (at, noise) = (factors.at(&values), factors.variances(&values));
     Unseen::of(at.residuals, noise.into(), &at.jacobian, root)

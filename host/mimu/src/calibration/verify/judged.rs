@@ -7,7 +7,7 @@ use super::{PowerOn, SensorVerification, Verification};
 use crate::calibration::Calibration;
 use crate::estimate::earth_shared;
 use crate::estimate::least_squares::root;
-use crate::fit::by_rate::variances;
+use crate::fit::by_rate::magnitudes;
 use crate::fit::predicted::{self, Both};
 use crate::judge::errors::{self, ErrorFigures};
 use crate::judge::input;
@@ -146,19 +146,16 @@ fn of_errors(
     if !of.iter().all(known) {
         return None;
     }
+    let own = [(sensor, &model)];
+    let factor = root(&covariance.resize(12, 12, 0.0));
     let unseen = match (prepared.manifest.reference, sensor) {
-        (Reference::Table, _) => inputs(prepared, sensor, &model, covariance)?,
+        (Reference::Table, _) => inputs(prepared, sensor, &model, &factor)?,
         (Reference::Gravity | Reference::TurntableRate, Sensor::Accel) => {
-            let poses = prepared.observations(Sensor::Accel);
-            let noise = prepared.magnitude_variances(&model, &poses);
-            let g = prepared.manifest.gravity_mps2;
-            predicted::magnitudes(&model, covariance, poses.iter().map(|o| (o, g)), noise)
+            predicted::unseen(&prepared.magnitudes(&model), &own, &factor)
         }
         (Reference::TurntableRate, Sensor::Gyro) => {
             let dwells = RatedDwells::of(prepared).ok()?;
-            let noise = variances(&model, &dwells.turning);
-            let known = dwells.turning.iter().zip(dwells.magnitudes());
-            predicted::magnitudes(&model, covariance, known, noise)
+            predicted::unseen(&magnitudes(&dwells, &model), &own, &factor)
         }
         (Reference::Gravity, Sensor::Gyro) => {
             let accel = calibration
@@ -207,7 +204,7 @@ fn inputs(
     prepared: &Prepared,
     sensor: Sensor,
     model: &Affine<f64>,
-    covariance: &Covariance,
+    factor: &DMatrix<f64>,
 ) -> Option<Unseen> {
     let forward = Forward::of(model)?;
     let all = earth_shared::likely(&prepared.observations(sensor), &forward.matrix);
@@ -224,8 +221,7 @@ fn inputs(
         .flat_map(|o| <[f64; 3]>::from(si_covariance(&model.matrix, &o.variance).diagonal()));
     let noise: Vec<f64> = noise.collect();
     let by = DMatrix::from_fn(errors.len(), 12, |i, j| blocks[i / 3].by[(i % 3, j)]);
-    let factor = root(&DMatrix::from_column_slice(12, 12, covariance.as_slice()));
-    Some(Unseen::of(errors.into(), noise.into(), &by, &factor))
+    Some(Unseen::of(errors.into(), noise.into(), &by, factor))
 }
 
 /// The judgement of the figures of `prepared`; `warnings` are those of the verification.

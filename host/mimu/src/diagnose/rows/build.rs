@@ -226,6 +226,26 @@ impl<'a> Part<'a> {
         }
     }
 
+    /// Sum over the increments of neighbouring `turns` of errors in the body frame, weighted by `by` and their lengths.
+    pub(super) fn sum_over(
+        &self,
+        turns: Range<usize>,
+        by: &[Vector3<f64>],
+        dwells: [usize; 2],
+    ) -> Row {
+        // Neighbouring turns have neighbouring conditions.
+        let own = &self.turns[turns];
+        let conditions = own[0].start..own[own.len() - 1].end;
+        let each = by.iter().zip(&self.conditions[conditions.clone()]);
+        let weights = each.map(|(by, at)| self.to_body.tr_mul(by) * at.duration_s);
+        Row {
+            weights: weights.collect(),
+            conditions,
+            dwells,
+            moving: false,
+        }
+    }
+
     /// Adds a row with the derivatives `by` about zero.
     pub(super) fn add(&mut self, y: f64, by: &ByTriad, own: Vec<f64>, row: Row) {
         self.lines.push(Line {
