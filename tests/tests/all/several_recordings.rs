@@ -163,7 +163,7 @@ fn a_chamber_that_only_cools_cannot_tell_temperature_from_time() {
         assert!(of_slow(&a.chosen.candidate.id()));
     }
     assert!(gyro.held_out_rms[1] < 0.2 * gyro.held_out_rms[0]);
-    let told = gyro.notes.iter().any(|n| n.found.contains("only falls"));
+    let told = gyro.notes.iter().any(|n| n.contains("only falls"));
     assert!(told, "{:?}", gyro.notes);
 }
 

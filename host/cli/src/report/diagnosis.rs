@@ -213,7 +213,7 @@ fn sensor(d: &DiagnosisResult, name: Sensor, s: &SensorDiagnosisResult, level: L
             (remarks(s, level))
             @for (k, of) in accepted(d, name).enumerate() { (effect::section(d, s, of, s.picture.effects.get(k).map(|panels| (&s.picture, panels)), level)) }
             @for note in &s.notes {
-                p { "note: " @if level.has_all() || note.advice.is_empty() { (note.to_string()) } @else { (note.found) " (--verbose)" } }
+                p { "note: " (note) }
             }
             (residuals(d, name, level))
             @if level.is_page() { (drawn(&s.picture, found)) }

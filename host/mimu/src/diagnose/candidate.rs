@@ -91,10 +91,13 @@ impl Candidate {
 
     /// Its columns in `rows`.
     pub fn columns(&self, rows: &Rows, parameter: f64) -> DMatrix<f64> {
-        if let Some(columns) = self.columns_by_axis(rows, &self.axes()) {
-            return columns;
+        match &self.kind {
+            CandidateKind::Term(axis, product) => rows.term(product, &[*axis]),
+            CandidateKind::Jump { axis, session, t_s } => rows.jump(*session, *t_s, *axis),
+            CandidateKind::Effect(_) => {
+                self.columns_at(rows, &rows.conditions(self.followed(parameter)), parameter)
+            }
         }
-        self.columns_at(rows, &rows.conditions(self.followed(parameter)), parameter)
     }
 
     /// Derivative of its contribution to `rows`, with the coefficients `values`, by the natural logarithm of its nonlinear parameter; unit of the
@@ -103,15 +106,6 @@ impl Candidate {
         let step = STEP.exp();
         let [up, down] = [parameter * step, parameter / step].map(|p| self.columns(rows, p));
         (up - down) * values / (2.0 * STEP)
-    }
-
-    /// Columns of a term or a jump as an error of each of `axes`; `None` for an effect.
-    pub fn columns_by_axis(&self, rows: &Rows, axes: &[usize]) -> Option<DMatrix<f64>> {
-        match &self.kind {
-            CandidateKind::Term(_, product) => Some(rows.term(product, axes)),
-            CandidateKind::Jump { session, t_s, .. } => Some(rows.jump(*session, *t_s, axes)),
-            CandidateKind::Effect(_) => None,
-        }
     }
 
     /// The candidate with all of the coefficients that the search chooses from.

@@ -21,12 +21,12 @@ use nalgebra::DVector;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::Heard;
-use super::note::Note;
 use super::rejected::{Reason, Rejected};
 use super::rows::Rows;
 use super::search::{Chosen, Search};
 use crate::diagnose::columns;
 use crate::effects::effect::Effect;
+use crate::effects::fitted::FittedEffect;
 use crate::fit::{SensorFit, Split};
 use acceptance::Acceptance;
 pub use accepted::Accepted;
@@ -88,7 +88,7 @@ pub struct Decision {
     /// Number of ends of dwells at which a jump of a bias was sought, and number of all.
     pub jumps_sought: [usize; 2],
     /// Notes on the accepted effects for the user.
-    pub notes: Vec<Note>,
+    pub notes: Vec<String>,
     /// Number of rows, and of affine parameters that they determine first. A judgement can only use their difference.
     pub rows: [usize; 2],
     /// Probability by chance that the rows scatter as they do without effects, by the known noise alone.
@@ -143,12 +143,16 @@ impl Decision {
             ids.push(accepted.chosen.candidate.id());
         }
         if !ids.is_empty() {
-            let found = format!(
-                "{}: the device had started by a reset, not by a power-on ({start}), so the time since power-on is unknown",
+            self.notes.push(format!(
+                "{}: the device had started by a reset, not by a power-on ({start}), so the time since power-on is unknown; the coefficients count from the start of the recording and are specific to it, so they are not stored in a calibration; switch the unit off and on, and record at once",
                 ids.join(", ")
-            );
-            self.notes.push(Note::new(found, "the coefficients count from the start of the recording and are specific to it, so they are not stored in a calibration; switch the unit off and on, and record at once"));
+            ));
         }
+    }
+
+    /// Accepted effects.
+    pub fn effects(&self) -> Vec<FittedEffect> {
+        self.accepted.iter().map(|a| a.effect.clone()).collect()
     }
 
     /// Residual structure beyond that of usual sensors.

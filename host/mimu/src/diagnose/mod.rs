@@ -9,7 +9,6 @@
 //! | [`variance`]    | variance of the residuals: known noise, extra white variance, rate random walk   |
 //! | [`search`]      | search for the effects that explain the residuals                                |
 //! | `judged`        | the judgement                                                                    |
-//! | [`note`]        | notes on accepted effects for the user                                           |
 //! | [`decision`]    | accepted effects, and residual errors                                            |
 //! | `passes`        | repeats the search with the affine model fitted beside strong effects            |
 //! | [`uncertainty`] | uncertainty that effects add to the calibration and to the forces of a gyro's turns |
@@ -20,7 +19,6 @@ mod candidate;
 pub mod columns;
 pub mod decision;
 mod judged;
-pub mod note;
 mod passes;
 pub mod picture;
 pub mod rejected;
@@ -431,7 +429,6 @@ impl Found<'_> {
         let Pass {
             rows,
             mut decision,
-            found,
             after,
         } = self.best_pass(sensor, heard)?;
         let affine = match self.effects.is_empty() {
@@ -440,8 +437,8 @@ impl Found<'_> {
         };
         let with_effects = after.is_some();
         if let Some(after) = after {
-            self.effects.extend(found);
-            (self.now, self.later) = after?;
+            self.effects.extend(decision.effects());
+            (self.now, self.later) = after;
         }
         if self.calibrator.held.is_none()
             && self.calibrator.recordings.more.is_empty()

@@ -13,7 +13,6 @@ use nalgebra::Matrix3;
 
 use super::as_written::AsWritten;
 use super::decision::{Decision, decide, noisier};
-use super::note::Note;
 use super::rejected::{Reason, Rejected};
 use super::rows::{ForceErrors, Rows, Session};
 use super::{Calibrator, Heard};
@@ -55,11 +54,6 @@ fn share_of(passes: f64) -> f64 {
     1.0 - (-passes).exp2()
 }
 
-/// Accepted effects.
-fn effects_of(decision: &Decision) -> Vec<FittedEffect> {
-    decision.accepted.iter().map(|a| a.effect.clone()).collect()
-}
-
 /// The accepted effects that are removed before the calibration. One that may be a true input instead stays in: no file stores it, and its
 /// mean over the poses is then part of the bias, as in a calibration without effects.
 fn removed_of(decision: &Decision) -> Vec<FittedEffect> {
@@ -84,43 +78,40 @@ fn explained_rms(decision: &Decision) -> f64 {
 pub(super) struct Pass {
     pub rows: Rows,
     pub decision: Decision,
-    /// Accepted effects.
-    pub found: Vec<FittedEffect>,
     /// The fit of the first recording without the effects, and the later recordings without them; `None` if none was accepted.
-    pub after: Option<Result<(Fit, Vec<Prepared>)>>,
+    pub after: Option<(Fit, Vec<Prepared>)>,
 }
 
 impl Pass {
-    /// Whether `other` is no better: by the held-out error, or because its readings without the effects cannot be calibrated.
+    /// Whether `other` is no better, by the held-out error.
     fn is_no_worse_than(&self, other: &Self) -> bool {
         let held_out = |pass: &Self| pass.decision.held_out_rms[1];
-        !matches!(other.after, Some(Ok(_))) || !(held_out(other) <= held_out(self))
+        other.after.is_none() || !(held_out(other) <= held_out(self))
     }
 
     /// Effects of the sensor's own input, about which rows are linearised if they are not linear in the readings. On a table the input is
     /// known, so there are none.
     fn about(&self) -> Vec<FittedEffect> {
         let is_linear = self.rows.observable.figure() == Figure::Input;
-        let found = self
-            .found
-            .iter()
-            .filter(|e| !is_linear && e.is_of_own_input());
-        found.cloned().collect()
+        let mut own = self.decision.effects();
+        own.retain(|e| !is_linear && e.is_of_own_input());
+        own
     }
 
-    /// Whether `other` has the same effects, and readings without them can be calibrated. If it is linearised about the effects found here,
-    /// its figures are closer to those of the calibration, and need not be lower.
+    /// Whether `other` has the same effects. If it is linearised about the effects found here, its figures are closer to those of the calibration, and
+    /// need not be lower.
     fn has_effects_of(&self, other: &Self) -> bool {
         let ids = |pass: &Self| -> Vec<String> {
-            let mut ids: Vec<String> = pass.found.iter().map(|e| e.candidate.id()).collect();
+            let effects = pass.decision.effects().into_iter();
+            let mut ids: Vec<String> = effects.map(|e| e.id()).collect();
             ids.sort_unstable();
             ids
         };
-        matches!(other.after, Some(Ok(_))) && ids(self) == ids(other)
+        other.after.is_some() && ids(self) == ids(other)
     }
 
     fn affine(&self, sensor: Sensor) -> Option<Affine<f64>> {
-        let (fit, _) = self.after.as_ref()?.as_ref().ok()?;
+        let (fit, _) = self.after.as_ref()?;
         Some(fit.sensor(sensor)?.estimated.triad.inverse)
     }
 }
@@ -153,11 +144,8 @@ impl Passes<'_> {
         let mut without = Vec::new();
         loop {
             let best = self.best_without(&without)?;
-            let worst = match &best.after {
-                Some(Ok((after, _))) => judge.worst(after, &best.decision),
-                _ => None,
-            };
-            match worst {
+            let after = best.after.as_ref();
+            match after.and_then(|(after, _)| judge.worst(after, &best.decision)) {
                 Some(worst) => without.push(worst),
                 None => return Ok(best),
             }
@@ -172,8 +160,8 @@ impl Passes<'_> {
         }
     }
 
-    /// The same with some effects not tried, each with the reason. If the accepted effects distorted the affine model, or cannot be removed,
-    /// each complex one is left out in turn, and the pass that predicts best is taken.
+    /// The same with some effects not tried, each with the reason. If the accepted effects distorted the affine model, each complex
+    /// one is left out in turn, and the pass that predicts best is taken.
     fn best_without(&self, without: &[Rejected]) -> Result<Pass> {
         let (mut best, strong) = self.converged(without)?;
         let complex = best.decision.accepted.iter();
@@ -183,16 +171,14 @@ impl Passes<'_> {
             let mut without = without.to_vec();
             without.push(self.rejected(id, Reason::OtherPredictsBetter));
             let (other, _) = self.converged(&without)?;
-            let refused = matches!(best.after, Some(Err(_)));
-            if matches!(other.after, Some(Ok(_))) && (refused || !best.is_no_worse_than(&other)) {
+            if !best.is_no_worse_than(&other) {
                 best = other;
             }
         }
         Ok(best)
     }
 
-    /// Repeats passes until the affine model stays. The flag says whether the first pass distorted it, or led to readings that cannot be
-    /// calibrated.
+    /// Repeats passes until the affine model stays. The flag says whether the first pass distorted it.
     fn converged(&self, without: &[Rejected]) -> Result<(Pass, bool)> {
         let sensor = self.sensor;
         let fits = Sensor::BOTH.map(|s| self.now.sensor(s));
@@ -205,7 +191,7 @@ impl Passes<'_> {
             relative_change(&was, &is) * explained_rms(&pass.decision)
                 > DISTORTED * pass.decision.noise_floor
         };
-        let strong = moves(&models, &pass) || matches!(pass.after, Some(Err(_)));
+        let strong = moves(&models, &pass);
         for _ in 1..PASSES {
             if !moves(&models, &pass) {
                 break;
@@ -296,25 +282,24 @@ impl Passes<'_> {
             let first = cleaned.remove(0);
             Ok((self.calibrator.calibrate(first)?, cleaned))
         };
-        let mut decision = decide(without)?;
-        let mut found = effects_of(&decision);
-        let mut after = (!found.is_empty()).then(|| clean(&removed_of(&decision)));
-        // Readings may be useless after removal of coefficients far larger than any sensor's.
-        // Such an effect explains nothing, and the recording need not be refused for it.
         let mut without = without.to_vec();
-        while let Some(Err(error)) = after {
+        let (mut decision, after) = loop {
+            let decision = decide(&without)?;
             let accepted = decision.accepted.iter().map(|a| &a.chosen);
             let strangest = accepted.max_by(|a, b| a.unlikely.total_cmp(&b.unlikely));
             let Some(strangest) = strangest else {
-                after = Some(Err(error));
-                break;
+                break (decision, None);
             };
-            let id = strangest.candidate.id();
-            without.push(self.rejected(id, Reason::NotCalibrated(error)));
-            decision = decide(&without)?;
-            found = effects_of(&decision);
-            after = (!found.is_empty()).then(|| clean(&removed_of(&decision)));
-        }
+            match clean(&removed_of(&decision)) {
+                Ok(after) => break (decision, Some(after)),
+                // Readings may be useless after removal of coefficients far larger than any sensor's. Such an effect explains nothing, and the recording
+                // need not be refused for it.
+                Err(error) => {
+                    let id = strangest.candidate.id();
+                    without.push(self.rejected(id, Reason::NotCalibrated(error)));
+                }
+            }
+        };
         let noisier = ours.iter().enumerate().flat_map(|(k, s)| {
             let mut all = noisier(s, sensor);
             for one in all.iter_mut().filter(|_| ours.len() > 1) {
@@ -325,11 +310,10 @@ impl Passes<'_> {
         decision.leftover.extend(noisier);
         decision.jumps_sought = [ends.len(), of];
         if ends.len() < of {
-            let found = format!(
+            decision.notes.push(format!(
                 "a jump of the bias was sought at {} of the {of} ends of dwells, so its time is that of the nearest of these",
                 ends.len()
-            );
-            decision.notes.push(Note::new(found, ""));
+            ));
         }
         let mut starts = all.iter().map(|p| p.manifest.start_without_power_on());
         if let Some(start) = starts.find_map(|s| s) {
@@ -338,7 +322,6 @@ impl Passes<'_> {
         Ok(Pass {
             rows,
             decision,
-            found,
             after,
         })
     }

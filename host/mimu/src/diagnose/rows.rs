@@ -19,6 +19,7 @@ mod known;
 mod terms;
 
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::OnceLock;
 
@@ -220,6 +221,9 @@ pub struct Rows {
     pub judged: (usize, usize),
     rows: Vec<Row>,
     conditions: Vec<Conditions>,
+    /// What the sensor reads under each of the conditions, raw; and its scale factors in each recording, raw/SI.
+    readings: Vec<Vector3<f64>>,
+    scales: BTreeMap<usize, Vector3<f64>>,
     /// Recording and block of each of the conditions.
     block: Vec<(usize, usize)>,
     /// Of each recording: time of each block, s, and its temperature, °C above the reference.
@@ -262,9 +266,8 @@ impl Rows {
     /// about the recorded readings, an accelerometer's cubic term of 3 % at 1 g came out 14 %, or 21 standard deviations, too large. About readings
     /// without the effect, the neglected part is as small as their remaining error.
     pub fn about(mut self, effects: &[FittedEffect], as_read: &Self) -> Option<Self> {
-        let pairs = self.conditions.iter_mut().zip(&as_read.conditions);
         // The error of a converter depends on the code that it put out.
-        pairs.for_each(|(clean, read)| clean.reading = read.reading);
+        self.readings.clone_from(&as_read.readings);
         let alike = |a: &Row, b: &Row| a.dwells == b.dwells && a.conditions == b.conditions;
         let same = self.rows.len() == as_read.rows.len()
             && self
@@ -379,55 +382,34 @@ impl Rows {
         of_row.iter().map(|m| value(m) * m.duration_s / total).sum()
     }
 
-    /// The same rows, for functions of the reading alone. Each dwell with constant input has one set of conditions, whose reading scatters as the
-    /// samples do.
-    pub fn by_dwell(&self) -> Self {
-        let mut out = self.clone();
-        out.quantities = OnceLock::new();
-        out.conditions.clear();
-        out.block.clear();
-        let mut merged: Vec<(Range<usize>, usize)> = Vec::new();
-        for row in &mut out.rows {
-            let range = row.conditions.clone();
-            let at = out.conditions.len();
-            let known = merged.iter().rev().find(|m| m.0 == range).map(|m| m.1);
-            if row.dwells[0] != row.dwells[1] || row.moving {
-                let at = known.unwrap_or_else(|| {
-                    let ours = &self.conditions[range.clone()];
-                    out.conditions.extend_from_slice(ours);
-                    out.block.extend_from_slice(&self.block[range.clone()]);
-                    merged.push((range.clone(), at));
-                    at
-                });
-                row.conditions = at..at + range.len();
-                continue;
-            }
-            let at = known.unwrap_or_else(|| {
-                out.conditions
-                    .push(Conditions::pooled(&self.conditions[range.clone()]));
-                out.block.push(self.block[range.start]);
-                merged.push((range, at));
-                at
+    /// What functions of the reading alone see of each row: the weights of an error of each axis, and the reading that it is a function of. A dwell with
+    /// constant input has one reading, whose samples scatter, without the `residuals` of its rows: the noise of a dwell is in its reading and in its row, and
+    /// any function of the noisy reading would seem to explain the row.
+    pub fn readings(&self, residuals: &DVector<f64>) -> Vec<Vec<[Vector3<f64>; 2]>> {
+        let steady = |row: &Row| row.dwells[0] == row.dwells[1] && !row.moving;
+        let mut of_dwells: BTreeMap<usize, Vector3<f64>> = BTreeMap::new();
+        let rows = self.rows.iter().zip(residuals.iter());
+        for (row, residual) in rows.filter(|(row, _)| steady(row)) {
+            let of_row = &self.conditions[row.conditions.clone()];
+            let mean = of_dwells.entry(row.conditions.start).or_insert_with(|| {
+                let total: f64 = of_row.iter().map(|at| at.duration_s).sum();
+                let each = of_row.iter().zip(&self.readings[row.conditions.clone()]);
+                each.map(|(at, reading)| reading * (at.duration_s / total))
+                    .sum()
             });
-            row.conditions = at..at + 1;
-            row.weights = vec![row.weights.iter().sum()];
+            let weight: Vector3<f64> = row.weights.iter().sum();
+            let error = weight * (residual / weight.norm_squared());
+            *mean -= self.scales[&of_row[0].session].component_mul(&error);
         }
-        out
-    }
-
-    /// The conditions of rows [by dwell](Self::by_dwell), with `residuals` subtracted from the readings. The noise of a dwell is in its
-    /// reading and in its row. Any function of the noisy reading would seem to explain the row.
-    pub fn conditions_without(&self, residuals: &DVector<f64>) -> Vec<Conditions> {
-        let mut conditions = self.conditions.clone();
-        for (row, residual) in self.rows.iter().zip(residuals.iter()) {
-            if let ([conditions], [weight]) =
-                (&mut conditions[row.conditions.clone()], &row.weights[..])
-            {
-                let error = weight * (residual / weight.norm_squared());
-                *conditions = conditions.read_without(&error);
+        let of_row = |row: &Row| match of_dwells.get(&row.conditions.start) {
+            Some(mean) if steady(row) => vec![[row.weights.iter().sum(), *mean]],
+            _ => {
+                let each = self.readings[row.conditions.clone()].iter();
+                let each = row.weights.iter().zip(each);
+                each.map(|(weight, reading)| [*weight, *reading]).collect()
             }
-        }
-        conditions
+        };
+        self.rows.iter().map(of_row).collect()
     }
 
     /// The conditions, with the temperature that an effect follows.

@@ -20,7 +20,6 @@ use super::rows::Rows;
 use super::variance::{Fitted, LikelihoodKind, VarianceModel};
 use crate::effects::candidate::{Candidate, CandidateKind};
 use crate::effects::effect::Effect;
-use crate::effects::quantity::Conditions;
 use chosen::score;
 pub(super) use chosen::without;
 pub use chosen::{Alternative, COEFFICIENT, Chosen};
@@ -59,8 +58,6 @@ struct Columns {
 pub struct Search<'a> {
     /// Rows.
     pub rows: &'a Rows,
-    /// The same by dwells, for functions of the reading.
-    by_dwell: Rows,
     /// Model of their variance.
     pub variance: VarianceModel<'a>,
     /// Basis of the columns of the affine parameters.
@@ -90,59 +87,27 @@ impl<'a> Search<'a> {
             ours.map(|(_, c)| c.tests()).sum::<f64>().max(1.0)
         };
         let variance = VarianceModel::new(rows, false);
-        let alike = |a: &Candidate, b: &Candidate| a.is_same_of_another_axis(b);
-        let alike: Vec<&[Candidate]> = candidates.chunk_by(alike).collect();
-        let screened = alike
-            .into_par_iter()
-            .flat_map_iter(|group| {
-                let axes: Vec<usize> = group.iter().flat_map(|c| c.axes()).collect();
-                match (&group[0], group[0].columns_by_axis(rows, &axes)) {
-                    (_, Some(plain)) => {
-                        let rotated = variance.rotate(&plain);
-                        let of_axis = |k| {
-                            vec![Columns {
-                                parameter: 0.0,
-                                plain: plain.columns(k, 1).into_owned(),
-                                rotated: rotated.columns(k, 1).into_owned(),
-                            }]
-                        };
-                        (0..axes.len()).map(of_axis).collect()
-                    }
-                    (one, None) => {
-                        let at = |parameter| {
-                            let plain = one.columns(rows, parameter);
-                            let rotated = variance.rotate(&plain);
-                            Columns {
-                                parameter,
-                                plain,
-                                rotated,
-                            }
-                        };
-                        vec![one.parameters().into_iter().map(at).collect()]
-                    }
+        let screened = candidates.par_iter().map(|one| {
+            let at = |parameter| {
+                let plain = one.columns(rows, parameter);
+                let rotated = variance.rotate(&plain);
+                Columns {
+                    parameter,
+                    plain,
+                    rotated,
                 }
-            })
-            .collect();
+            };
+            one.parameters().into_iter().map(at).collect()
+        });
+        let screened = screened.collect();
         Self {
             rows,
             screened,
             basis: basis(&rows.nuisance),
             tests: [count(true), count(false)],
-            by_dwell: rows.by_dwell(),
             variance,
             candidates,
         }
-    }
-
-    /// The rows by dwells, for functions of the reading.
-    pub(super) fn by_dwell(&self) -> &Rows {
-        &self.by_dwell
-    }
-
-    /// Conditions by dwell, with the residuals of `model` fitted as `fitted` subtracted from the readings.
-    pub(super) fn freed(&self, model: &DMatrix<f64>, fitted: &Fitted) -> Vec<Conditions> {
-        let left = &self.rows.y - model * &fitted.coefficients;
-        self.by_dwell.conditions_without(&left)
     }
 
     /// The columns of each of the chosen among those of the [model](Self::model).
@@ -402,20 +367,6 @@ impl Candidate {
     /// Whether both are the same but for the choice of coefficients.
     fn is_variant_of(&self, other: &Self) -> bool {
         self.kind == other.kind
-    }
-
-    /// Whether both are a term or a jump, and the same but for the axis.
-    fn is_same_of_another_axis(&self, other: &Self) -> bool {
-        let on_x = |kind: &CandidateKind| match *kind {
-            CandidateKind::Effect(_) => None,
-            CandidateKind::Term(_, product) => Some(CandidateKind::Term(0, product)),
-            CandidateKind::Jump { session, t_s, .. } => Some(CandidateKind::Jump {
-                axis: 0,
-                session,
-                t_s,
-            }),
-        };
-        on_x(&self.kind).is_some_and(|kind| on_x(&other.kind) == Some(kind))
     }
 
     /// Number of independent tests that it counts as, apart from the choice among its variants.

@@ -3,7 +3,7 @@
 //! If such a law explains the rows as well as an effect, the effect is still accepted, because it reduces the error. But the recording does not show
 //! which of the two is the cause, and the verdict says so.
 
-use super::effect::{Coefficient, Effect, NonlinearParameter, Role, each};
+use super::effect::{Coefficient, Effect, NonlinearParameter, Role, each, matrix, times};
 use super::quantity::Quantity::{Force, Input, RateMagnitude, Time};
 use super::regressor::Regressor;
 use crate::quantity::Sensor;
@@ -38,24 +38,14 @@ const FIELD: [Coefficient; 3] = [
 
 /// A supply that sags with the motor's current, or a bearing that shakes. The unit measures neither. But an axis also reads a few per cent of the
 /// rates about the other axes, so the fine bits of its codes can distinguish turning from rest.
-const TURNING: [Coefficient; 9] = {
-    let [x, y, z] = [
+const TURNING: [Coefficient; 9] = matrix(
+    [
         Regressor::linear(RateMagnitude),
         Regressor::power(RateMagnitude, 2),
-        super::effect::times(Input, RateMagnitude),
-    ];
-    [
-        Coefficient::of(0, "x", x, 1.0),
-        Coefficient::of(0, "x squared", y, 1.0),
-        Coefficient::of(0, "x scale", z, 1.0),
-        Coefficient::of(1, "y", x, 1.0),
-        Coefficient::of(1, "y squared", y, 1.0),
-        Coefficient::of(1, "y scale", z, 1.0),
-        Coefficient::of(2, "z", x, 1.0),
-        Coefficient::of(2, "z squared", y, 1.0),
-        Coefficient::of(2, "z scale", z, 1.0),
-    ]
-};
+        times(Input, RateMagnitude),
+    ],
+    1.0,
+);
 
 const fn law(
     id: &'static str,

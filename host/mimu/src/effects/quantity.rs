@@ -4,7 +4,6 @@ use nalgebra::Vector3;
 
 use crate::quantity::AXES;
 use crate::quantity::Sensor;
-use crate::signal::blocks::Moments;
 use mimu_recording::units::STANDARD_GRAVITY;
 
 /// Temperature from which temperature offsets count, °C.
@@ -38,56 +37,6 @@ pub struct Conditions {
     pub temperature_offset: f64,
     /// The same behind a first-order lag: that of the effect, or [`RATE_LAG_S`].
     pub lagged_temperature: f64,
-    /// What the sensor reads.
-    pub reading: Reading,
-}
-
-impl Conditions {
-    /// Conditions at the same input as one: the first, with the readings and durations of all.
-    pub(crate) fn pooled(all: &[Self]) -> Self {
-        let total: f64 = all.iter().map(|c| c.duration_s).sum();
-        let mean = |of: &dyn Fn(&Self) -> Vector3<f64>| -> Vector3<f64> {
-            all.iter().map(|c| of(c) * (c.duration_s / total)).sum()
-        };
-        let level = mean(&|c| c.reading.mean);
-        let mut pooled = all[0];
-        pooled.duration_s = total;
-        pooled.reading.mean = level;
-        pooled
-    }
-
-    /// The conditions with the readings that the sensor would give without `error` of its axes, SI.
-    pub fn read_without(&self, error: &Vector3<f64>) -> Self {
-        let mut clean = *self;
-        clean.reading.mean -= self.reading.scale.component_mul(error);
-        clean
-    }
-}
-
-/// Raw readings of the three axes of a sensor over a segment of time.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Reading {
-    /// Their mean, raw.
-    pub mean: Vector3<f64>,
-    /// Scale factors, raw/SI, positive.
-    pub scale: Vector3<f64>,
-}
-
-impl Reading {
-    /// For conditions that were not recorded: without noise, in SI.
-    pub const NONE: Self = Self {
-        mean: Vector3::new(0.0, 0.0, 0.0),
-        scale: Vector3::new(1.0, 1.0, 1.0),
-    };
-
-    /// The reading with these statistical `moments` of the three axes.
-    pub fn of(moments: &[Moments], scale: &Vector3<f64>) -> Self {
-        let mean = |i: usize| moments[i].mean;
-        Self {
-            mean: Vector3::from_fn(|i, _| mean(i)),
-            scale: *scale,
-        }
-    }
 }
 
 /// A quantity that regressors are made of. The axis that errs is given with the regressor.

@@ -7,7 +7,7 @@ use mimu_core::die::BEYOND_C;
 use nalgebra::{Matrix3, Vector3};
 
 use super::fitted::FittedEffect;
-use super::quantity::{Conditions, Need, Reading};
+use super::quantity::{Conditions, Need};
 use super::temperature::{Followed, lagged, offsets, without_self_heating};
 use crate::prepared::Prepared;
 use crate::quantity::Sensor;
@@ -115,57 +115,6 @@ pub fn remove_within(
     Some(out)
 }
 
-/// The effects of a sensor, and what evaluating them needs.
-struct SensorEffects<'a> {
-    sensor: Sensor,
-    /// Sensitive directions by rows; `to_body`, their inverse, transforms errors along them to the body frame.
-    direction: Matrix3<f64>,
-    to_body: Matrix3<f64>,
-    effects: &'a [&'a FittedEffect],
-    /// For each effect that does not follow the recorded temperature: its temperature and the lagged one, by block.
-    followed_temperatures: Vec<Option<Vec<(f64, f64)>>>,
-}
-
-impl SensorEffects<'_> {
-    /// The conditions without `error` of the sensor.
-    fn without(&self, at: &Conditions, error: &Vector3<f64>) -> Conditions {
-        let mut clean = *at;
-        let input = match self.sensor {
-            Sensor::Gyro => &mut clean.rate,
-            Sensor::Accel => &mut clean.force,
-        };
-        *input -= self.to_body * error;
-        clean.sensed = self.direction * *input;
-        clean
-    }
-
-    /// Errors of the axes under conditions within block `at`, SI.
-    fn error(&self, conditions: &Conditions, at: usize) -> Vector3<f64> {
-        let sum = |conditions: &Conditions| {
-            let mut error = Vector3::zeros();
-            for (effect, followed) in self.effects.iter().zip(&self.followed_temperatures) {
-                let now = (conditions.temperature_offset, conditions.temperature_offset);
-                let (temperature_offset, lagged_temperature) =
-                    followed.as_ref().map_or(now, |l| l[at]);
-                let conditions = Conditions {
-                    temperature_offset,
-                    lagged_temperature,
-                    ..*conditions
-                };
-                effect.add(&conditions, &mut error);
-            }
-            error
-        };
-        // As on the device: if the error is steeper than the input, a second evaluation would diverge.
-        let first = sum(conditions);
-        let second = sum(&self.without(conditions, &first));
-        match (second - first).norm_squared() < first.norm_squared() {
-            true => second,
-            false => first,
-        }
-    }
-}
-
 fn of_sensor(
     prepared: &Prepared,
     sensor: Sensor,
@@ -215,7 +164,13 @@ fn followed_temperature(effect: &FittedEffect, recorded: &[(f64, f64)]) -> Optio
 /// The removal of the effects of one sensor from a recording.
 struct Removal<'a> {
     prepared: &'a Prepared,
-    effects: SensorEffects<'a>,
+    sensor: Sensor,
+    effects: &'a [&'a FittedEffect],
+    /// Sensitive directions by rows; `to_body`, their inverse, transforms errors along them to the body frame.
+    direction: Matrix3<f64>,
+    to_body: Matrix3<f64>,
+    /// For each effect that does not follow the recorded temperature: its temperature and the lagged one, by block.
+    followed_temperatures: Vec<Option<Vec<(f64, f64)>>>,
     /// Inverse model of the sensor, and those of gyro and accelerometer.
     model: &'a Affine<f64>,
     models: [Option<&'a Affine<f64>>; 2],
@@ -248,13 +203,11 @@ impl<'a> Removal<'a> {
         let followed = effects.iter().map(|e| followed_temperature(e, &recorded));
         Some(Self {
             prepared,
-            effects: SensorEffects {
-                sensor,
-                direction,
-                to_body: direction.try_inverse()?,
-                effects,
-                followed_temperatures: followed.collect(),
-            },
+            sensor,
+            effects,
+            direction,
+            to_body: direction.try_inverse()?,
+            followed_temperatures: followed.collect(),
             model,
             models,
             scale,
@@ -267,10 +220,6 @@ impl<'a> Removal<'a> {
 
     fn blocks(&self) -> &'a [Block] {
         &self.prepared.condensed.blocks
-    }
-
-    fn first_channel(&self) -> usize {
-        self.effects.sensor.channels().start
     }
 
     /// Mean readings in block `at` of three channels.
@@ -286,7 +235,7 @@ impl<'a> Removal<'a> {
         force: Vector3<f64>,
     ) -> Conditions {
         let block = &self.blocks()[at];
-        let input = match self.effects.sensor {
+        let input = match self.sensor {
             Sensor::Gyro => rate,
             Sensor::Accel => force,
         };
@@ -299,10 +248,47 @@ impl<'a> Removal<'a> {
             rate,
             force,
             angular_acceleration: Vector3::zeros(),
-            sensed: self.effects.direction * input,
+            sensed: self.direction * input,
             temperature_offset: self.recorded[at].1,
             lagged_temperature: self.recorded[at].1,
-            reading: Reading::NONE,
+        }
+    }
+
+    /// The conditions without `error` of the sensor.
+    fn without(&self, at: &Conditions, error: &Vector3<f64>) -> Conditions {
+        let mut clean = *at;
+        let input = match self.sensor {
+            Sensor::Gyro => &mut clean.rate,
+            Sensor::Accel => &mut clean.force,
+        };
+        *input -= self.to_body * error;
+        clean.sensed = self.direction * *input;
+        clean
+    }
+
+    /// Errors of the axes under conditions within block `at`, SI.
+    fn error(&self, conditions: &Conditions, at: usize) -> Vector3<f64> {
+        let sum = |conditions: &Conditions| {
+            let mut error = Vector3::zeros();
+            for (effect, followed) in self.effects.iter().zip(&self.followed_temperatures) {
+                let now = (conditions.temperature_offset, conditions.temperature_offset);
+                let (temperature_offset, lagged_temperature) =
+                    followed.as_ref().map_or(now, |l| l[at]);
+                let conditions = Conditions {
+                    temperature_offset,
+                    lagged_temperature,
+                    ..*conditions
+                };
+                effect.add(&conditions, &mut error);
+            }
+            error
+        };
+        // As on the device: if the error is steeper than the input, a second evaluation would diverge.
+        let first = sum(conditions);
+        let second = sum(&self.without(conditions, &first));
+        match (second - first).norm_squared() < first.norm_squared() {
+            true => second,
+            false => first,
         }
     }
 
@@ -310,7 +296,7 @@ impl<'a> Removal<'a> {
         let each = self.recorded.iter().enumerate().map(|(at, (t_s, _))| {
             let [rate, force] = [0, 1].map(|s| apply(self.models[s], self.raw(at, 3 * s)));
             let conditions = self.conditions(at, *t_s, rate, force);
-            self.effects.error(&conditions, at)
+            self.error(&conditions, at)
         });
         each.collect()
     }
@@ -326,7 +312,7 @@ impl<'a> Removal<'a> {
         let force = apply(self.models[1], self.raw(at, 3));
         let mut conditions = self.conditions(at, t_s, self.model.apply(&mean), force);
         conditions.duration_s = piece.duration_s;
-        let error = self.effects.error(&conditions, at);
+        let error = self.error(&conditions, at);
         for i in 0..3 {
             piece.integral[i] -= self.scale[i] * error[i] * piece.duration_s;
         }
@@ -335,13 +321,13 @@ impl<'a> Removal<'a> {
     fn correct_blocks(&self, blocks: &mut [Block], of_block: &[Vector3<f64>]) {
         for (block, error) in blocks.iter_mut().zip(of_block) {
             for i in 0..3 {
-                block.raw[self.first_channel() + i].mean -= self.scale[i] * error[i];
+                block.raw[self.sensor.channels().start + i].mean -= self.scale[i] * error[i];
             }
         }
     }
 
     fn correct_dwell(&self, dwell: &mut Dwell, of_block: &[Vector3<f64>]) {
-        let (blocks, from) = (self.blocks(), self.first_channel());
+        let (blocks, from) = (self.blocks(), self.sensor.channels().start);
         let range = dwell.blocks.clone();
         for i in 0..3 {
             // Weighted by the samples present, as in the mean of the dwell.

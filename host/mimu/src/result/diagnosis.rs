@@ -6,7 +6,6 @@ use serde::Serialize;
 use super::TOOL;
 use crate::calibration::verify::Verification;
 use crate::diagnose::decision::{Accepted, Decision, Leftover, Undecided};
-use crate::diagnose::note::Note;
 use crate::diagnose::picture::Picture;
 use crate::diagnose::rejected::Rejected;
 use crate::diagnose::{Diagnosis, SensorDiagnosis, Source, Untestable, Verdict};
@@ -121,7 +120,7 @@ pub struct SensorDiagnosisResult {
     /// two.
     pub explained: Option<f64>,
     /// Notes on the accepted effects for the user.
-    pub notes: Vec<Note>,
+    pub notes: Vec<String>,
     /// Number of ends of dwells at which a jump of a bias was sought, and number of all: in a long recording not at every one.
     pub jumps_sought: [usize; 2],
     /// Residuals that the model is fitted to.

@@ -3,7 +3,7 @@
 use mimu::effects;
 use mimu::effects::candidate::{Candidate, CandidateKind};
 use mimu::effects::effect::OnDevice;
-use mimu::effects::quantity::{Conditions, REFERENCE_C, Reading};
+use mimu::effects::quantity::{Conditions, REFERENCE_C};
 use mimu::effects::temperature::lagged;
 use mimu::quantity::Sensor;
 use mimu_core::compensation::Sample;
@@ -75,7 +75,6 @@ fn every_effect_is_evaluated_by_the_device_as_its_data_say() {
                 sensed: directions.sensed * own,
                 temperature_offset: offsets[1],
                 lagged_temperature: lagged(&signal, parameter.unwrap_or(1.0))[1],
-                reading: Reading::NONE,
             };
             let candidate = Candidate::new(effect.sensor, CandidateKind::Effect(effect));
             let mut error = Vector3::zeros();

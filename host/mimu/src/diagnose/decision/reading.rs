@@ -6,7 +6,7 @@
 //! to be too large for chance, and has to predict held-out dwells. It also has to do better than the same function of the readings of
 //! another axis, because an unrecorded quantity may look like either.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, Vector3};
 
 use super::hold_out::{held_out, rms};
 use super::leftover::{CorrelatesWith, FALSE_LEFTOVER, Leftover};
@@ -14,7 +14,6 @@ use crate::diagnose::columns::{beside, independent_of, unit_columns};
 use crate::diagnose::rows::Rows;
 use crate::diagnose::search::{COEFFICIENT, Chosen, Search, without};
 use crate::diagnose::variance::{Fitted, LikelihoodKind};
-use crate::effects::quantity::Conditions;
 use crate::fit::Split;
 use crate::observable::{Observable, StratumName};
 use crate::signal::blocks::extent;
@@ -34,25 +33,26 @@ pub(super) struct OfReading {
     pub columns: DMatrix<f64>,
 }
 
-/// Readings of the dwells without their noise.
-struct Readings<'a> {
-    rows: &'a Rows,
-    conditions: Vec<Conditions>,
+/// Readings of the rows without their noise.
+struct Readings {
+    /// See [`Rows::readings`].
+    rows: Vec<Vec<[Vector3<f64>; 2]>>,
     /// Lowest reading and range of each axis, raw.
     range: [(f64, f64); 3],
 }
 
-impl<'a> Readings<'a> {
-    fn new(rows: &'a Rows, conditions: Vec<Conditions>) -> Self {
+impl Readings {
+    /// Beside `model`, fitted as `fitted`.
+    fn of(rows: &Rows, model: &DMatrix<f64>, fitted: &Fitted) -> Self {
+        let rows = rows.readings(&(&rows.y - model * &fitted.coefficients));
         let range = |axis: usize| {
-            let all = conditions.iter().map(|m| m.reading.mean[axis]);
+            let all = rows.iter().flatten().map(|[_, reading]| reading[axis]);
             let [low, high] = extent(all.filter(|u| u.is_finite()));
             (low, high - low)
         };
         Self {
-            rows,
             range: std::array::from_fn(range),
-            conditions,
+            rows,
         }
     }
 
@@ -65,13 +65,14 @@ impl<'a> Readings<'a> {
         value: impl Fn(f64, usize) -> f64,
     ) -> DMatrix<f64> {
         let (low, range) = self.range[read];
-        self.rows
-            .columns(&self.conditions, &vec![axis; count], |at, out| {
-                let share = (at.reading.mean[read] - low) / range;
-                for (k, out) in out.iter_mut().enumerate() {
-                    *out = value(share, k);
-                }
-            })
+        DMatrix::from_fn(self.rows.len(), count, |r, k| {
+            let moved = self.rows[r]
+                .iter()
+                .filter(|[weight, _]| weight[axis] != 0.0);
+            let each = moved
+                .map(|[weight, reading]| weight[axis] * value((reading[read] - low) / range, k));
+            each.sum()
+        })
     }
 
     fn smooth(&self, axis: usize) -> DMatrix<f64> {
@@ -95,7 +96,7 @@ pub(super) fn of_readings(
     last: &Fitted,
     split: Split,
 ) -> Vec<OfReading> {
-    let readings = Readings::new(search.by_dwell(), search.freed(model, last));
+    let readings = Readings::of(search.rows, model, last);
     (0..3)
         .filter(|axis| readings.range[*axis].1 > 0.0)
         .filter_map(|axis| of_axis(search, model, last, &readings, axis, split))
@@ -186,7 +187,7 @@ pub(super) fn worse_with_steps(search: &Search, chosen: &[Chosen], one: usize) -
     let columns = chosen[one].columns.ncols();
     let (null, now) = (search.fit(&rest)?, search.fit(chosen)?);
     let model = search.model(&rest);
-    let readings = Readings::new(search.by_dwell(), search.freed(&model, &null));
+    let readings = Readings::of(search.rows, &model, &null);
     let axes = (0..3).filter(|axis| readings.range[*axis].1 > 0.0);
     let all: Vec<DMatrix<f64>> = axes
         .map(|axis| readings.steps(axis, axis, PLACES))

@@ -6,7 +6,6 @@
 use nalgebra::DMatrix;
 
 use crate::diagnose::columns::beside;
-use crate::diagnose::note::Note;
 use crate::diagnose::search::{Alternative, COEFFICIENT, CONFUSED, Chosen, Search};
 use crate::diagnose::variance::Fitted;
 use crate::effects;
@@ -28,7 +27,7 @@ struct Part {
 
 /// For each kept effect, puts the one that is the same at a constant input first among its alternatives, if the rows do not distinguish the
 /// two; returns notes about these. `with` is the fit of all.
-pub(super) fn together(search: &Search, kept: &mut [Chosen], with: &Fitted) -> Vec<Note> {
+pub(super) fn together(search: &Search, kept: &mut [Chosen], with: &Fitted) -> Vec<String> {
     let mut notes = Vec::new();
     for i in 0..kept.len() {
         let id = kept[i].candidate.id();
@@ -45,13 +44,11 @@ pub(super) fn together(search: &Search, kept: &mut [Chosen], with: &Fitted) -> V
             continue;
         };
         let axes: Vec<&str> = parts.iter().map(|p| AXES[p.axis]).collect();
-        let found = format!(
-            "{id} ({}): {} fits as well, because the input along the axis hardly changes in this recording",
+        notes.push(format!(
+            "{id} ({}): {} fits as well, because the input along the axis hardly changes in this recording; at other inputs the two differ; the calibration contains the first",
             axes.join(", "),
             rival.id
-        );
-        let advice = "at other inputs the two differ; the calibration contains the first";
-        notes.push(Note::new(found, advice));
+        ));
         let others = &mut kept[i].alternatives;
         others.retain(|o| o.id != rival.id);
         let rival = Candidate::new(rival.sensor, CandidateKind::Effect(rival));

@@ -1,8 +1,9 @@
 //! Plots of an effect against the quantity that it depends on.
 //!
 //! Component plus residual instead of an added-variable plot, which shows two residuals against each other, not against a rate or a
-//! temperature. As in the added-variable plot, the part of the component that the affine calibration absorbs is subtracted. Otherwise a cubic would be drawn
-//! with a scale factor that the recording does not show.
+//! temperature. As in the added-variable plot, the part of the component that the affine calibration absorbs is subtracted: of a function of one quantity
+//! its mean, and its best straight line if the calibration is linear in the quantity. Otherwise a cubic would be drawn with a scale factor that the recording
+//! does not show.
 
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
@@ -132,6 +133,7 @@ pub(super) fn panels(
         rows,
         one,
         across: columns - basis * share,
+        basis,
         conditions: &rows.conditions(candidate.followed(one.chosen.parameter)),
     };
     let each = tracks.iter().flat_map(|track| {
@@ -147,6 +149,8 @@ struct Drawn<'a> {
     one: &'a Accepted,
     /// Its columns without what the affine calibration absorbs.
     across: DMatrix<f64>,
+    /// Basis of the columns of the affine calibration.
+    basis: &'a DMatrix<f64>,
     conditions: &'a [Conditions],
 }
 
@@ -170,13 +174,21 @@ impl Drawn<'_> {
             .select_rows(members)
             .select_columns(members);
         let axis = track.axis.unwrap_or_default();
+        let mean = |r: &usize, on: Quantity| {
+            let conditions = self.conditions;
+            self.rows.mean(*r, conditions, |at| on.of(at, axis))
+        };
+        let x: Option<Vec<f64>> = on.map(|on| track.rows.iter().map(|r| mean(r, on)).collect());
+        let of_track = |m: &DMatrix<f64>| m.select_rows(&track.rows).select_columns(members);
+        let beside = match &x {
+            Some(x) => self.beside_line(of_track(columns), x, track),
+            None => of_track(&self.across),
+        };
         let (mut points, mut curve) = (Vec::new(), Vec::new());
-        for (r, sample) in track.rows.iter().zip(&track.samples) {
-            let by = DVector::from_fn(count, |k, _| self.across[(*r, members[k])]);
+        for (i, sample) in track.samples.iter().enumerate() {
+            let by = beside.row(i).transpose();
             let value = by.dot(&values);
-            let x = on.map_or(value, |on| {
-                self.rows.mean(*r, self.conditions, |at| on.of(at, axis))
-            });
+            let x = x.as_ref().map_or(value, |x| x[i]);
             let partial = sample.residual[1] + value;
             points.push(At {
                 x,
@@ -205,6 +217,29 @@ impl Drawn<'_> {
             points,
             curve,
         })
+    }
+
+    /// `columns` of the rows of a track without their best straight lines in `x`, or without their means if the affine calibration cannot absorb a line.
+    fn beside_line(&self, columns: DMatrix<f64>, x: &[f64], track: &Track) -> DMatrix<f64> {
+        let x = DVector::from_column_slice(x);
+        let x = x.add_scalar(-x.mean());
+        let mut line = DVector::zeros(self.across.nrows());
+        for (r, x) in track.rows.iter().zip(x.iter()) {
+            line[*r] = *x;
+        }
+        let left = &line - self.basis * self.basis.tr_mul(&line);
+        // Within 1 %: the input is known for each dwell only, and the reading is along the sensor's own direction.
+        let sloped = left.norm() < 0.01 * line.norm();
+        let mut beside = columns;
+        for mut column in beside.column_iter_mut() {
+            let mean = column.mean();
+            column.add_scalar_mut(-mean);
+            if sloped {
+                let slope = column.dot(&x) / x.norm_squared();
+                column.axpy(-slope, &x, 1.0);
+            }
+        }
+        beside
     }
 }
 

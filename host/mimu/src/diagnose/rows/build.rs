@@ -7,7 +7,7 @@ use mimu_core::compensation::Affine;
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
 use super::{FreeParameters, Row, Session, Stratum};
-use crate::effects::quantity::{Conditions, Reading};
+use crate::effects::quantity::Conditions;
 use crate::effects::temperature::offsets;
 use crate::noise::wander::{Slow, Span};
 use crate::observation::turn::Turn;
@@ -44,6 +44,8 @@ pub(super) struct Part<'a> {
     pub lines: Vec<Line>,
     pub strata: Vec<Stratum>,
     pub conditions: Vec<Conditions>,
+    /// What the sensor reads under them, raw.
+    pub readings: Vec<Vector3<f64>>,
     pub block: Vec<usize>,
     pub temperature_offset: Vec<(f64, f64)>,
     /// The conditions of each dwell, and of each turn.
@@ -92,6 +94,7 @@ impl<'a> Part<'a> {
             lines: Vec::new(),
             strata: Vec::new(),
             conditions: Vec::new(),
+            readings: Vec::new(),
             block: Vec::new(),
             temperature_offset: offsets(blocks),
             dwells: BTreeMap::new(),
@@ -139,11 +142,9 @@ impl<'a> Part<'a> {
             sensed: self.direction * input,
             temperature_offset: self.temperature_offset[at].1,
             lagged_temperature: self.temperature_offset[at].1,
-            reading: Reading::of(
-                &prepared.condensed.blocks[at].raw[self.sensor.channels()],
-                &self.scale,
-            ),
         });
+        let raw = &prepared.condensed.blocks[at].raw[self.sensor.channels()];
+        self.readings.push(Vector3::from_fn(|i, _| raw[i].mean));
     }
 
     /// The conditions of a dwell, block by block: the input that the table gives, or rest under the force that the accelerometer measures.
@@ -199,11 +200,11 @@ impl<'a> Part<'a> {
             let rate = self.model.apply(&raw);
             let force = self.measured_force(&Vector3::from_fn(|i, _| blocks[at].raw[3 + i].mean));
             self.add_conditions(at, (t_s, piece.duration_s), rate, force);
-            let [.., before, now] = &mut self.conditions[..] else {
-                continue;
-            };
-            now.reading.mean = raw;
+            let last = self.conditions.len() - 1;
+            self.readings[last] = raw;
             if k > 0 {
+                let before = self.conditions[last - 1];
+                let now = &mut self.conditions[last];
                 now.angular_acceleration = (rate - before.rate) / (now.t_s - before.t_s);
             }
         }
@@ -222,6 +223,26 @@ impl<'a> Part<'a> {
             moving: self.session.prepared.dwells.list[index]
                 .moves
                 .contains(&true),
+        }
+    }
+
+    /// Sum over the increments of neighbouring `turns` of errors in the body frame, weighted by `by` and their lengths.
+    pub(super) fn sum_over(
+        &self,
+        turns: Range<usize>,
+        by: &[Vector3<f64>],
+        dwells: [usize; 2],
+    ) -> Row {
+        // Neighbouring turns have neighbouring conditions.
+        let own = &self.turns[turns];
+        let conditions = own[0].start..own[own.len() - 1].end;
+        let each = by.iter().zip(&self.conditions[conditions.clone()]);
+        let weights = each.map(|(by, at)| self.to_body.tr_mul(by) * at.duration_s);
+        Row {
+            weights: weights.collect(),
+            conditions,
+            dwells,
+            moving: false,
         }
     }
 

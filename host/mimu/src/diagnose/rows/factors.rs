@@ -4,7 +4,7 @@ use mimu_core::compensation::Affine;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::build::{Part, mean};
-use super::{Row, Stratum, row_variances, shared_by_several};
+use super::{Stratum, row_variances, shared_by_several};
 use crate::estimate::earth::poses;
 use crate::factor::chains::Chains;
 use crate::factor::{Factors, Kind};
@@ -44,21 +44,7 @@ impl Part<'_> {
                         let mut by = at.jacobian.fixed_view::<1, 12>(r, 0).transpose();
                         let along: Vector3<f64> = by.fixed_rows::<3>(9).into_owned();
                         let row = match &of_turns {
-                            Some((turns, by)) => {
-                                // Neighbouring turns have neighbouring conditions.
-                                let of = &self.turns[turns.clone()];
-                                let conditions = of[0].start..of[of.len() - 1].end;
-                                let pieces = self.conditions[conditions.clone()].iter();
-                                let weights = by[k].iter().zip(pieces);
-                                let weights =
-                                    weights.map(|(by, at)| self.to_body.tr_mul(by) * at.duration_s);
-                                Row {
-                                    weights: weights.collect(),
-                                    conditions,
-                                    dwells: dwells_of,
-                                    moving: false,
-                                }
-                            }
+                            Some((turns, by)) => self.sum_over(turns.clone(), &by[k], dwells_of),
                             None => self.mean_over(dwells_of[0], self.to_body.tr_mul(&along)),
                         };
                         // The mean reading of all dwells at rest instead of each dwell's own, whose noise is in the row too. With the latter, a matrix

@@ -46,6 +46,18 @@ fn order(parts: &[(usize, Part)], judged: &[usize]) -> Vec<(usize, usize)> {
     order
 }
 
+/// What one unit of each column of the first recording, which come first and will have length 1, adds to its inverse model: C by rows, then o.
+fn parameters(head: &Part, nuisance: &DMatrix<f64>) -> DMatrix<f64> {
+    let change = from_centre(&head.centre);
+    let mut all = DMatrix::zeros(12, head.free.len() + 3 + head.lines[0].own.len());
+    for (k, of) in head.free.iter().copied().chain(OF_BIAS..12).enumerate() {
+        let size = nuisance.column(k).norm();
+        let size = if size > 0.0 { size } else { 1.0 };
+        all.set_column(k, &(change.column(of) / size));
+    }
+    all
+}
+
 /// One problem of `parts`, each with the index of its recording, out of `sessions` recordings. `None` if the first recording
 /// is missing.
 pub(super) fn join(sensor: Sensor, parts: &[(usize, Part)], sessions: usize) -> Option<Rows> {
@@ -62,12 +74,14 @@ pub(super) fn join(sensor: Sensor, parts: &[(usize, Part)], sessions: usize) -> 
     let total: usize = parts.iter().map(|p| p.1.lines.len()).sum();
     let mut temperature = vec![Vec::new(); sessions];
     let (mut conditions, mut block, mut first_condition) = (Vec::new(), Vec::new(), Vec::new());
+    let mut readings = Vec::new();
     let mut dwells = vec![0; sessions];
     for (session, part) in parts {
         let session = *session;
         first_condition.push(conditions.len());
         let own = part.conditions.iter();
         conditions.extend(own.map(|m| Conditions { session, ..*m }));
+        readings.extend_from_slice(&part.readings);
         block.extend(part.block.iter().map(|b| (session, *b)));
         temperature[session].clone_from(&part.temperature_offset);
         let last = part.lines.iter().flat_map(|line| line.row.dwells).max();
@@ -111,21 +125,13 @@ pub(super) fn join(sensor: Sensor, parts: &[(usize, Part)], sessions: usize) -> 
         }
         strata.push(stratum);
     }
-    // The columns of the first recording come first.
-    let change = from_centre(&head.centre);
-    let mut parameters = DMatrix::zeros(12, places[0].len());
-    for (k, of) in head.free.iter().copied().chain(OF_BIAS..12).enumerate() {
-        let size = nuisance.column(k).norm();
-        let size = if size > 0.0 { size } else { 1.0 };
-        parameters.set_column(k, &(change.column(of) / size));
-    }
     let is_unknown = |part: &Part| {
         part.session.prepared.manifest.latitude_deg.is_none()
             && part.reference() != Reference::Table
     };
     Some(Rows {
         sensor,
-        parameters,
+        parameters: parameters(head, &nuisance),
         nuisance: unit_columns(&nuisance),
         y,
         by_matrix,
@@ -135,6 +141,8 @@ pub(super) fn join(sensor: Sensor, parts: &[(usize, Part)], sessions: usize) -> 
         judged: (judged.iter().sum(), observable.components()),
         rows,
         conditions,
+        readings,
+        scales: parts.iter().map(|(s, part)| (*s, part.scale)).collect(),
         block,
         without_self_heating: temperature
             .iter()

@@ -133,14 +133,14 @@ impl Part<'_> {
             return;
         };
         for (k, block) in course.blocks.iter().enumerate() {
-            let at = &mut self.conditions[conditions.start + block - list.blocks.start];
+            let at = conditions.start + block - list.blocks.start;
             if let (true, Some([_, change])) =
                 (list.moves(Sensor::Gyro), &course.of[Sensor::Gyro as usize])
             {
-                at.angular_acceleration = change[k];
+                self.conditions[at].angular_acceleration = change[k];
             }
             if let Some([input, _]) = &course.of[self.sensor as usize] {
-                at.reading.mean = forward.apply(&input[k]);
+                self.readings[at] = forward.apply(&input[k]);
             }
         }
     }

@@ -73,11 +73,11 @@ impl Rows {
             .product()
     }
 
-    /// A jump at `t_s` of recording `session` as an error of each of `axes`.
-    pub fn jump(&self, session: usize, t_s: f64, axes: &[usize]) -> DMatrix<f64> {
+    /// A jump at `t_s` of recording `session` as an error of `axis`.
+    pub fn jump(&self, session: usize, t_s: f64, axis: usize) -> DMatrix<f64> {
         let times = self.quantities().t_s.iter().zip(&self.block);
         let since = times.map(|(t, (of, _))| f64::from(u8::from(*of == session && *t >= t_s)));
-        self.weighted(axes, &since.collect::<Vec<_>>())
+        self.weighted(&[axis], &since.collect::<Vec<_>>())
     }
 
     /// First and last of the times of each recording's conditions, s since it began; zeros for one without rows.

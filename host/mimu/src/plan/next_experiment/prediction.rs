@@ -7,7 +7,7 @@ use super::recipe::Experiment;
 use crate::effects;
 use crate::effects::candidate::{Candidate, CandidateKind};
 use crate::effects::effect::{Effect, NonlinearParameter};
-use crate::effects::quantity::{Conditions, Reading};
+use crate::effects::quantity::Conditions;
 use crate::observation::{ByTriad, LOWER, slope};
 use crate::plan::design::information::{Inverse, Rows};
 use crate::quantity::Sensor;
@@ -163,7 +163,6 @@ fn apart_from_bias(mut candidate: Candidate) -> Candidate {
             },
             temperature_offset: 20.0 * even(0.316_625),
             lagged_temperature: 20.0 * even(0.872_983),
-            reading: Reading::NONE,
         };
         candidate.regressors(&at, parameter, &mut values);
         for (column, value) in columns.iter_mut().zip(&values) {

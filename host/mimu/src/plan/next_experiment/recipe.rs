@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::Setup;
-use crate::effects::quantity::{Conditions, REFERENCE_C, Reading};
+use crate::effects::quantity::{Conditions, REFERENCE_C};
 use crate::effects::temperature::lagged;
 use crate::plan::chamber::temp_c;
 use crate::plan::design::model::{GRAVITY, Setting};
@@ -251,7 +251,6 @@ impl Experiment {
             };
             Conditions {
                 session: 0,
-                reading: Reading::NONE,
                 t_s,
                 on_s: t_s,
                 from_middle_s: t_s,
