@@ -18,6 +18,30 @@ impl Block {
             text: Some(table.markdown()),
         }
     }
+
+    /// With the commit that it was made at, for tables that take too long to be made again by every test run: a reader sees how old the figures are.
+    pub fn made_here(mut self) -> Self {
+        if let (Some(text), Some(commit)) = (&mut self.text, commit()) {
+            let _ = write!(text, "\nMade at commit {commit}.");
+        }
+        self
+    }
+}
+
+/// The commit of the working tree, with `+` if there are changes to it.
+fn commit() -> Option<String> {
+    let git = |arguments: &[&str]| {
+        let output = std::process::Command::new("git")
+            .args(arguments)
+            .current_dir(docs())
+            .output();
+        let text = String::from_utf8(output.ok()?.stdout).ok()?;
+        Some(text.trim().to_owned())
+    };
+    let commit = git(&["rev-parse", "--short=8", "HEAD"]).filter(|c| !c.is_empty())?;
+    let changed = git(&["status", "--porcelain", "--untracked-files=no", ".."])?;
+    let changed = changed.lines().any(|l| !l.contains("docs/"));
+    Some(commit + if changed { "+" } else { "" })
 }
 
 /// Markdown table with aligned columns.

@@ -142,7 +142,8 @@ fn write(wanted: &[&str]) -> Result<(), Box<dyn std::error::Error>> {
         if !wanted.is_empty() && !wanted.contains(&study.command) {
             continue;
         }
-        let mut blocks = (study.blocks)(study.runs);
+        let blocks = (study.blocks)(study.runs);
+        let mut blocks: Vec<Block> = blocks.into_iter().map(Block::made_here).collect();
         let others = STUDIES.iter().filter(|s| s.command != study.command);
         blocks.extend(
             others

@@ -111,15 +111,64 @@ impl CsvFile {
     fn read(&self, lines: &mut Lines, piece: usize) -> Result<Batch> {
         let (mut record, mut noticed) = (csv::ByteRecord::new(), Noticed::default());
         let mut batch = Batch::default();
+        let mut numbers = Vec::with_capacity(self.names.len());
         while batch.len() < piece {
-            let next = lines.next(&mut record, &mut noticed);
+            let next = lines.next_row(&mut noticed);
             let next = next.map_err(Unreadable::into_error)?;
             let row = next.filter(|(_, ended)| *ended || !self.leaves_out_cut);
             let Some((number, ended)) = row else { break };
-            self.push(&record, &mut batch)
-                .map_err(|fault| self.refused(fault, &record, number, ended))?;
+            if self.plain(lines.line(), &mut numbers) {
+                self.push_numbers(&numbers, &mut batch);
+                continue;
+            }
+            Separator::Comma.split(lines.line(), &mut record);
+            if !record.iter().all(<[u8]>::is_empty) {
+                self.push(&record, &mut batch)
+                    .map_err(|fault| self.refused(fault, &record, number, ended))?;
+            }
         }
         Ok(batch)
+    }
+
+    /// Parses a line of plain cells in place, without looking for their ends first, which takes half the time of [`Self::push`]. False if a cell is
+    /// anything else: then `push` decides.
+    fn plain(&self, line: &[u8], numbers: &mut Vec<f64>) -> bool {
+        numbers.clear();
+        let mut rest = Some(line).filter(|line| memchr::memchr(b'"', line).is_none());
+        for slot in &self.layout.slots {
+            let Some(text) = rest else { return false };
+            let end = || memchr::memchr(b',', text).unwrap_or(text.len());
+            let (number, used) = match slot {
+                None => (f64::NAN, end()),
+                Some(Column::Step) => match cell::step(&text[..end()]) {
+                    Ok(step) => (f64::from(step), end()),
+                    Err(_) => return false,
+                },
+                Some(column) => match fast_float2::parse_partial::<f64, _>(text) {
+                    Ok((number, used)) if !number.is_nan() && cell::is_reading(number) => {
+                        (number, used)
+                    }
+                    Err(_) if text.starts_with(b",") && *column != Column::Time => (f64::NAN, 0),
+                    _ => return false,
+                },
+            };
+            if !matches!(text.get(used), None | Some(b',')) {
+                return false;
+            }
+            numbers.push(number);
+            rest = text.get(used + 1..);
+        }
+        rest.is_none()
+    }
+
+    fn push_numbers(&self, numbers: &[f64], batch: &mut Batch) {
+        for (number, slot) in numbers.iter().zip(&self.layout.slots) {
+            let Some(column) = *slot else { continue };
+            match batch.values_mut(column) {
+                Some(values) => values.push(*number),
+                None => batch.step.push(*number as i32),
+            }
+        }
     }
 
     fn push(&self, record: &csv::ByteRecord, batch: &mut Batch) -> std::result::Result<(), Fault> {

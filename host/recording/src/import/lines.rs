@@ -77,21 +77,35 @@ impl Lines {
         cells: &mut csv::ByteRecord,
         noticed: &mut Noticed,
     ) -> std::result::Result<Option<(u64, bool)>, Unreadable> {
-        while let Some((number, ended)) = self.next_line(noticed)? {
+        while let Some(row) = self.next_row(noticed)? {
+            self.format.split(&self.line, cells);
+            if !cells.iter().all(<[u8]>::is_empty) {
+                return Ok(Some(row));
+            }
+            // Spreadsheets end with rows of nothing but separators.
+            noticed.skipped.blank += 1;
+        }
+        Ok(None)
+    }
+
+    /// Puts the next line that is neither blank nor a comment into [`Self::line`]; returns its number and whether it is whole.
+    pub fn next_row(
+        &mut self,
+        noticed: &mut Noticed,
+    ) -> std::result::Result<Option<(u64, bool)>, Unreadable> {
+        while let Some(row) = self.next_line(noticed)? {
             match self.format.kind(&self.line) {
                 Kind::Blank => noticed.skipped.blank += 1,
                 Kind::Comment => noticed.skipped.comment += 1,
-                Kind::Other => {
-                    self.format.split(&self.line, cells);
-                    if !cells.iter().all(<[u8]>::is_empty) {
-                        return Ok(Some((number, ended)));
-                    }
-                    // Spreadsheets end with rows of nothing but separators.
-                    noticed.skipped.blank += 1;
-                }
+                Kind::Other => return Ok(Some(row)),
             }
         }
         Ok(None)
+    }
+
+    /// The line of the last row.
+    pub fn line(&self) -> &[u8] {
+        &self.line
     }
 
     /// Puts the next line, or the next row of labelled lines, into `line`.
