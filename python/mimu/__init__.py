@@ -32,7 +32,7 @@ __version__ = _version("mimu")
 __all__ = [
     "Allan", "Biases", "Calibration", "Cause", "Channel", "Coefficient", "CoefficientSigma", "Consistency", "Density", "Design", "Diagnosis", "Dwell",
     "Effect", "Error", "Estimate", "Export", "Figures", "Fit", "Judgement", "Leftover", "Message", "Mounted", "Nees", "NextExperiment", "Noise",
-    "NoiseCoefficient", "NoiseInUse", "NotExcited", "Parameter", "ParameterSigma", "Recording", "Rejected", "SchemeComparison",
+    "NoiseCoefficient", "NoiseInUse", "NotExcited", "Parameter", "ParameterSigma", "Recording", "Rejected",
     "SensorDiagnosis", "SensorFit", "SensorVerification", "SessionsFit", "Shown", "Verification", "allan", "design", "diagnose",
     "export", "fit", "fit_sessions", "load", "load_noise", "next_experiment", "noise_in_use", "read", "thermal", "verify",
 ]
