@@ -1,6 +1,7 @@
 //! Examples at the end of each subcommand's help. A test parses each of them.
 
 use clap::CommandFactory;
+use mimu_export::Noise;
 
 use crate::Cli;
 
@@ -13,10 +14,11 @@ fn of(name: &str) -> Vec<&'static str> {
     EXAMPLES.lines().filter(is).collect()
 }
 
-/// Export formats that store noise; the others do not list the option.
-const WITH_NOISE: [&str; 6] = [
-    "kalibr", "openvins", "vins", "orbslam3", "liosam", "fastlio",
-];
+/// Whether an export format declares a place for noise; the others do not list the option.
+fn stores_noise(name: &str) -> bool {
+    let mut formats = mimu_export::FORMATS.iter();
+    formats.any(|format| format.name == name && format.noise != Noise::No)
+}
 
 /// Hides `--noise` from the formats of `mimu export` that do not store noise.
 fn formats(mut export: clap::Command) -> clap::Command {
@@ -24,7 +26,7 @@ fn formats(mut export: clap::Command) -> clap::Command {
         .get_subcommands()
         .map(|c| c.get_name().to_owned())
         .collect();
-    for name in names.iter().filter(|n| !WITH_NOISE.contains(&n.as_str())) {
+    for name in names.iter().filter(|n| !stores_noise(n)) {
         let noise = clap::Arg::new("noise")
             .long("noise")
             .value_parser(clap::value_parser!(std::path::PathBuf))
@@ -58,9 +60,10 @@ mod tests {
                 .get_arguments()
                 .find(|a| a.get_id() == "noise")
                 .unwrap();
-            let listed = WITH_NOISE.contains(&format.get_name());
+            let listed = stores_noise(format.get_name());
             assert_eq!(noise.is_hide_set(), !listed, "{}", format.get_name());
         }
+        assert!(stores_noise("gazebo") && !stores_noise("px4"));
         let parse = |line: &str| {
             command
                 .clone()
