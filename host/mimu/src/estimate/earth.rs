@@ -110,3 +110,45 @@ pub fn poses(ups: &[Vector3<f64>]) -> Vec<usize> {
     }
     out
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_ground_turns_up_at_the_north_pole_level_at_the_equator_and_more_up_than_level_at_60_deg()
+    {
+        // The Earth turns once in a sidereal day, 86164.0905 s. At 60 deg its axis stands 60 deg above the horizon: the legs are half and √3/2.
+        let day = std::f64::consts::TAU / 86_164.090_5;
+        for (latitude_deg, up, level) in [
+            (90.0, day, 0.0),
+            (0.0, 0.0, day),
+            (60.0, 0.75f64.sqrt() * day, 0.5 * day),
+            (-60.0, -0.75f64.sqrt() * day, 0.5 * day),
+            (-90.0, -day, 0.0),
+        ] {
+            let earth = Earth::at(Some(latitude_deg));
+            assert!(
+                (earth.vertical - up).abs() < 1e-6 * day,
+                "{latitude_deg}: {earth:?}"
+            );
+            let mean_square = 0.5 * level * level;
+            assert!(
+                (earth.level - mean_square).abs() < 1e-6 * day * day,
+                "{latitude_deg}: {earth:?}"
+            );
+            assert_eq!(earth.vertical_error, 0.0);
+        }
+    }
+
+    #[test]
+    fn without_a_latitude_the_mean_squares_of_the_components_add_up_to_that_of_the_rate() {
+        let Earth {
+            vertical,
+            vertical_error,
+            level,
+        } = Earth::at(None);
+        assert_eq!(vertical, 0.0);
+        assert!((vertical_error + 2.0 * level - RATE * RATE).abs() < 1e-9 * RATE * RATE);
+    }
+}
