@@ -1,7 +1,7 @@
 //! Calibrations and noise in the formats of other programs.
 //!
 //! Each format is one file: what it [declares](Format) (name, help, convention, row of the documentation), its options, its formula and its source. To
-//! add one, write its file and name it twice here.
+//! add one, write its file and name its module and its format here.
 //!
 //! | module | contents |
 //! |---|---|
@@ -73,7 +73,7 @@ use crate::remaining::{Places, Remaining};
 pub use crate::sources::Sources;
 
 /// All formats, in the order of `mimu export --help`.
-pub static FORMATS: [Format; 27] = [
+pub static FORMATS: &[Format] = &[
     Format::of::<c::C>(),
     Format::of::<rust::Rust>(),
     Format::of::<json::Json>(),

@@ -58,7 +58,7 @@ fn the_page_offers_what_each_format_declares_for_it() {
     };
     let mut lines = String::new();
     for of in ["calibration", "noise"] {
-        for format in &FORMATS {
+        for format in FORMATS {
             let noise = matches!(format.noise, Noise::Needed | Noise::Only);
             for page in format.pages.iter().filter(|_| noise == (of == "noise")) {
                 lines += &entry(format, page, of);

@@ -7,9 +7,9 @@ use nalgebra::{Cholesky, DMatrix, DVector, Matrix3};
 
 use super::closure::{Closure, scales};
 use super::component::{Component, Kind};
-use super::rests::EARTH;
 use super::smoothed::{Smoothed, SmoothedState};
 use super::state::{CLOCK, G_SENSITIVITY, GRAVITY, LEVER, MOUNTING, STATES, offset};
+use crate::estimate::earth;
 use crate::quantity::{PerSensor, Sensor};
 use crate::readable::STANDARD_GRAVITY;
 
@@ -243,7 +243,7 @@ impl Session {
         if !self.earth_is_known && !self.mounted {
             // The Earth turns about the vertical, as if the gyro sensed gravity.
             for k in G_SENSITIVITY {
-                all[(k, k)] += (EARTH / STANDARD_GRAVITY).powi(2) / 3.0;
+                all[(k, k)] += (earth::RATE / STANDARD_GRAVITY).powi(2) / 3.0;
             }
         }
         if self.mounted {

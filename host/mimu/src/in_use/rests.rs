@@ -9,6 +9,7 @@ use super::linearisation::Linearisation;
 use super::state::{By, Readings, STATES};
 use super::walk::{Span, Walked, walk};
 use crate::calibration::Calibration;
+use crate::estimate::earth;
 use crate::prepared::Prepared;
 use crate::quantity::{PerSensor, Sensor};
 use mimu_recording::Recording;
@@ -18,8 +19,6 @@ use mimu_recording::error::Result;
 const SHORTEST_REST_S: f64 = 0.3;
 /// Shortest and longest segment, s. Over a longer one consumer gyros lose the attitude by degrees, and the linearisation with it.
 const SEGMENT_S: [f64; 2] = [0.2, 120.0];
-/// Rate of the Earth, rad/s. Its direction is not known, so a third of its square is on each axis.
-pub(super) const EARTH: f64 = 7.292e-5;
 
 /// The closures of a recording: its rests, and the segments between them, in order of time; and the number of segments that could not be used.
 pub(super) fn closures(
@@ -57,7 +56,7 @@ pub(super) fn closures(
         ..
     } = walked;
     let latitude = prepared.manifest.latitude_deg;
-    let vertical = latitude.map_or(0.0, |deg| EARTH * deg.to_radians().sin());
+    let vertical = latitude.map_or(0.0, |deg| earth::RATE * deg.to_radians().sin());
     let mut closures = Vec::new();
     let mut refused = 0;
     for (k, mean) in means.iter().enumerate() {
@@ -166,7 +165,7 @@ fn at_rest(rest: &Readings, [from, to]: [f64; 2], noise: &AllanNoise, vertical: 
     let density = noise.squared().gyro;
     let known = DMatrix::from_fn(3, 3, |i, j| {
         if i == j {
-            density[i] / t + EARTH * EARTH / 3.0
+            density[i] / t + earth::RATE * earth::RATE / 3.0
         } else {
             0.0
         }
