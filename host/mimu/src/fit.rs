@@ -425,10 +425,18 @@ fn finish(sensor: Sensor, estimated: Estimated, judged: Judged) -> SensorFit {
 
 /// Whether a figure describes this group of observations.
 fn describes(figure: Figure, group: Observable) -> bool {
-    match figure {
-        Figure::Input => matches!(group, Observable::Axis(_) | Observable::Within(_)),
-        Figure::GravityMagnitude | Figure::RateMagnitude => group == Observable::Magnitude,
-        Figure::Direction => matches!(group, Observable::Turns | Observable::AfterWholeTurns),
+    match group {
+        Observable::Axis(_) | Observable::Within(_) => figure == Figure::Input,
+        Observable::Magnitude => {
+            matches!(figure, Figure::GravityMagnitude | Figure::RateMagnitude)
+        }
+        Observable::Turns | Observable::AfterWholeTurns => figure == Figure::Direction,
+        Observable::AtRest(_)
+        | Observable::Second(_)
+        | Observable::WholeTurns
+        | Observable::AsDelivered
+        | Observable::Rest
+        | Observable::Force => false,
     }
 }
 

@@ -39,7 +39,12 @@ impl Observable {
                 Figure::Direction
             }
             Self::Magnitude => Figure::GravityMagnitude,
-            _ => Figure::Input,
+            Self::Axis(_)
+            | Self::Within(_)
+            | Self::AtRest(_)
+            | Self::Second(_)
+            | Self::Rest
+            | Self::Force => Figure::Input,
         }
     }
 
@@ -47,7 +52,15 @@ impl Observable {
     pub fn components(self) -> usize {
         match self {
             Self::Turns | Self::AfterWholeTurns => 2,
-            _ => 1,
+            Self::Axis(_)
+            | Self::Within(_)
+            | Self::AtRest(_)
+            | Self::Second(_)
+            | Self::WholeTurns
+            | Self::AsDelivered
+            | Self::Rest
+            | Self::Magnitude
+            | Self::Force => 1,
         }
     }
 }

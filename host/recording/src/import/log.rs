@@ -9,7 +9,7 @@ use super::readings::{Choice, LogFormat, Readings};
 use super::{ardupilot, gyroflow, px4, ros};
 use crate::error::{Argument, Error, Result};
 
-const FORMATS: [&LogFormat; 6] = [
+const FORMATS: &[&LogFormat] = &[
     &ros::BAG,
     &ros::MCAP,
     &ros::DB3,
@@ -20,14 +20,16 @@ const FORMATS: [&LogFormat; 6] = [
 
 fn format(path: &Path) -> Option<&'static LogFormat> {
     let ending = path.extension()?;
-    let mut all = FORMATS.into_iter();
+    let mut all = FORMATS.iter().copied();
     all.find(|format| ending.eq_ignore_ascii_case(format.ending))
 }
 
 /// The formats of logs for people: `ROS 1 (.bag), PX4 (.ulg)` and so on.
 pub fn log_formats() -> String {
-    let each = FORMATS.map(|format| format!("{} (.{})", format.name, format.ending));
-    each.join(", ")
+    let each = FORMATS
+        .iter()
+        .map(|f| format!("{} (.{})", f.name, f.ending));
+    each.collect::<Vec<_>>().join(", ")
 }
 
 /// Whether a file is such a log, by its ending. The readings of logs are in rad/s and m/s², their stamps in ns.
