@@ -244,7 +244,9 @@ impl Study {
 fn interval(variance: f64, of_estimate: f64) -> Sigma {
     let value = variance.max(0.0).sqrt();
     let dof = 2.0 * variance * variance / of_estimate;
-    if !(variance > 0.0) || !(dof > 0.0) {
+    // Where the likelihood has no curvature the estimate has no variance, which does not mean that it is exact.
+    let is_known = variance > 0.0 && dof > 0.0 && dof.is_finite();
+    if !is_known {
         return Sigma {
             value,
             lower: 0.0,

@@ -11,7 +11,7 @@ use super::white::{White, of_spectrum};
 pub struct Line {
     /// Frequency with half of its power below, Hz.
     pub frequency_hz: f64,
-    /// Band that contains the middle half of its power, Hz; `None` for a line narrower than [`Line::resolution_hz`].
+    /// Band that contains the middle half of its power, Hz; `None` if it is not resolved: from about [`Line::resolution_hz`] down.
     pub width_hz: Option<f64>,
     /// Effective value within [`Line::band_hz`], unit of the series.
     pub rms: f64,

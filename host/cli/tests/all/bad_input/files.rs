@@ -22,7 +22,8 @@ fn an_output_that_cannot_be_written_is_refused_before_anything_appears() {
     fit(&["-o", &good, "--json", &below]).refused(&["file/x.toml", "cannot be created"]);
     // Folders that were made for a result are removed with it.
     fit(&["-o", &new, "--json", &below]).refused(&["file/x.toml"]);
-    fit(&["-o", &new, "--only", "magnetometer"]).refused(&["--only"]);
+    let none = place.text("none.toml");
+    fit(&["-o", &new, "--noise", &none]).refused(&["none.toml"]);
     fit(&["-o", &recording]).refused(&["rec", "directory"]);
     fit(&["-o", &good, "--json", &good]).refused(&["cal.toml", "another result"]);
     let samples = place.recording().join("samples.csv");
