@@ -4,7 +4,6 @@ use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
 use super::search::{Band, Resolution, Search, line_width_hz};
 use super::welch::{BIN_OVERLAP, Welch};
-use super::white::{White, of_spectrum};
 
 /// What stands above the floor of a spectrum.
 #[derive(Debug, Clone, PartialEq)]
@@ -52,11 +51,9 @@ impl Lines {
         }
     }
 
-    /// N from the band in which the spectrum of the series (samples `dt_s` apart) is white, with an interval of probability `confidence`. The bands of the
-    /// lines are excluded, and as much on both sides of each: the slopes of a bump would pass for flicker noise there. `None` if the spectrum fits such
-    /// noise in no band, or the series is too short.
-    pub fn white_band(&self, dt_s: f64, confidence: f64) -> Option<White> {
-        of_spectrum(self.finest.as_ref()?, dt_s, &self.lines, confidence)
+    /// The spectrum at the finest resolution, unless it was dropped.
+    pub(super) fn spectrum(&self) -> Option<&Welch> {
+        self.finest.as_ref()
     }
 
     /// Drops the spectrum, 8 MB for three hours at 1 kHz; afterwards [`Self::white_band`] returns `None`.

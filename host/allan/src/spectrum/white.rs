@@ -5,7 +5,7 @@
 
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
-use super::lines::Line;
+use super::lines::{Line, Lines};
 use super::welch::Welch;
 use crate::gamma::{GammaFit, MeanSquare, sets};
 use crate::model::PLAUSIBLE;
@@ -50,13 +50,17 @@ struct Mean {
     of: MeanSquare<TERMS>,
 }
 
-/// As [`super::Lines::white_band`]; `welch` has the spectrum.
-pub(super) fn of_spectrum(
-    welch: &Welch,
-    dt_s: f64,
-    lines: &[Line],
-    confidence: f64,
-) -> Option<White> {
+impl Lines {
+    /// N from the band in which the spectrum of the series (samples `dt_s` apart) is white, with an interval of probability `confidence`. The bands of the
+    /// lines are excluded, and as much on both sides of each: the slopes of a bump would pass for flicker noise there. `None` if the spectrum fits such
+    /// noise in no band, or the series is too short.
+    pub fn white_band(&self, dt_s: f64, confidence: f64) -> Option<White> {
+        of_spectrum(self.spectrum()?, dt_s, &self.lines, confidence)
+    }
+}
+
+/// As [`Lines::white_band`]; `welch` has the spectrum.
+fn of_spectrum(welch: &Welch, dt_s: f64, lines: &[Line], confidence: f64) -> Option<White> {
     let beside = |line: &Line| {
         let [low, high] = line.band_hz;
         [2.0 * low - high, 2.0 * high - low]

@@ -11,7 +11,6 @@ use mimu::quantity::{Sensor, significant};
 use mimu::readable::Readable;
 use mimu::recording_problem::OfRecording;
 
-use super::svg::raised;
 use super::terminal::text;
 use crate::output::now;
 
@@ -195,6 +194,16 @@ pub(super) fn spoken(sensor: Sensor) -> &'static str {
         Sensor::Gyro => "gyro",
         Sensor::Accel => "accelerometer",
     }
+}
+
+/// Digits as superscripts.
+pub(super) fn raised(text: &str) -> String {
+    let one = |c: char| match c.to_digit(10) {
+        Some(digit) => "⁰¹²³⁴⁵⁶⁷⁸⁹".chars().nth(digit as usize).unwrap_or(c),
+        None if c == '-' => '⁻',
+        None => c,
+    };
+    text.chars().map(one).collect()
 }
 
 #[cfg(test)]

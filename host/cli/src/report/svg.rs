@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use maud::{Markup, PreEscaped, html};
 
-use super::page::{FIGURES, STYLE};
+use super::page::{FIGURES, STYLE, raised};
 
 /// Maps values to pixels of a drawing.
 #[derive(Debug, Clone)]
@@ -348,16 +348,6 @@ pub fn times_ten(power: i32) -> String {
         return String::new();
     }
     format!("10{} ", raised(&power.to_string()))
-}
-
-/// Digits as superscripts.
-pub fn raised(text: &str) -> String {
-    let one = |c: char| match c.to_digit(10) {
-        Some(digit) => "⁰¹²³⁴⁵⁶⁷⁸⁹".chars().nth(digit as usize).unwrap_or(c),
-        None if c == '-' => '⁻',
-        None => c,
-    };
-    text.chars().map(one).collect()
 }
 
 /// About this many round numbers in the range, with their labels.

@@ -1,9 +1,9 @@
 //! Checks whether a calibration file can be applied.
 
 use mimu_core::compensation::{Affine, Implausible};
+use mimu_core::table::{TEMPERATURE_RANGE_C, is_temperature};
 use nalgebra::{Matrix3, Vector3};
 
-use super::over_temperature::{problem_of_range, problem_of_temperature};
 use super::{
     Calibration, FORMAT, FORMAT_OF_CURVES, FORMULA, INVERSE_DIRECTION, TriadTable, effect,
 };
@@ -180,4 +180,20 @@ fn check_both_ways(table: &TriadTable, forward: &Forward, place: &str) -> Result
         "C and o are not the inverse of forward.P and forward.b: the file was edited",
         "fit the recording again",
     ))
+}
+
+/// What is wrong with a range of temperatures, °C, that has this `name` in a file.
+pub(super) fn problem_of_range(name: &str, [from, to]: [f64; 2]) -> Option<String> {
+    let [least, most] = TEMPERATURE_RANGE_C;
+    let right = is_temperature(from) && is_temperature(to) && from <= to;
+    (!right).then(|| format!(
+        "{name} is [{from}, {to}]; it has to increase, from {least} °C at least to {most} °C at most"
+    ))
+}
+
+/// What is wrong with a temperature, °C.
+pub(super) fn problem_of_temperature(temp_c: f64) -> Option<String> {
+    let [least, most] = TEMPERATURE_RANGE_C;
+    (!is_temperature(temp_c))
+        .then(|| format!("temp_c is {temp_c}; it has to be from {least} to {most} °C"))
 }

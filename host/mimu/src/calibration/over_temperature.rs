@@ -5,12 +5,12 @@ use mimu_core::compensation::Affine;
 use mimu_core::die::{DieLag, LAG_RANGE_S, LEAST_LAG_S};
 use mimu_core::effects::REFERENCE_C;
 use mimu_core::stored::NODES;
-use mimu_core::table::{Node, TEMPERATURE_RANGE_C, Table, is_temperature};
+use mimu_core::table::{Node, Table};
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::Calibration;
-use super::check::implausible;
+use super::check::{implausible, problem_of_range, problem_of_temperature};
 use crate::quantity::{PerSensor, Sensor};
 use mimu_recording::error::{Error, Result};
 
@@ -113,22 +113,6 @@ pub struct Curves {
     table: Table<f64, NODES>,
     lags: PerSensor<DieLag<f64>>,
     has: PerSensor<bool>,
-}
-
-/// What is wrong with a range of temperatures, °C, that has this `name` in a file.
-pub(super) fn problem_of_range(name: &str, [from, to]: [f64; 2]) -> Option<String> {
-    let [least, most] = TEMPERATURE_RANGE_C;
-    let right = is_temperature(from) && is_temperature(to) && from <= to;
-    (!right).then(|| format!(
-        "{name} is [{from}, {to}]; it has to increase, from {least} °C at least to {most} °C at most"
-    ))
-}
-
-/// What is wrong with a temperature, °C.
-pub(super) fn problem_of_temperature(temp_c: f64) -> Option<String> {
-    let [least, most] = TEMPERATURE_RANGE_C;
-    (!is_temperature(temp_c))
-        .then(|| format!("temp_c is {temp_c}; it has to be from {least} to {most} °C"))
 }
 
 /// Index of the node that represents a calibration if there can be only one model, from the `temperatures` of the nodes, °C. It is nearest to the

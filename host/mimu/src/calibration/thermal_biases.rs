@@ -10,7 +10,7 @@ use mimu_core::table::{Node, Table};
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
-use super::over_temperature::{problem_of_range, problem_of_temperature};
+use super::check::{problem_of_range, problem_of_temperature};
 use super::{DieTable, Origin};
 use crate::judgement::Judgement;
 use crate::quantity::{PerSensor, Sensor};

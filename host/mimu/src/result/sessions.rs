@@ -97,7 +97,7 @@ pub struct SessionParameter {
     pub upper: f64,
     /// 95 % interval of the value that the next power-on will have; null for parameters that define the frame.
     pub next_power_on: Option<[f64; 2]>,
-    /// Standard deviation between sessions, by REML.
+    /// Standard deviation between sessions, by REML; null for a single session, which says nothing of it.
     pub between_sigma: Option<f64>,
     /// Its 95 % interval.
     pub between_sigma_interval: Option<[f64; 2]>,
@@ -184,7 +184,11 @@ fn parameters(
         };
         let (value, tomorrow) = (pick(&expected), pick(&next));
         let free = common.free.iter().position(|f| *f == k);
-        let between = free.map(|f| &common.between.parameters[f]);
+        // One session says nothing about the scatter between several: the likelihood of it is flat.
+        let several = common.left_out.len() > 1;
+        let between = free
+            .filter(|_| several)
+            .map(|f| &common.between.parameters[f]);
         let session = |(s, own): (usize, &Option<crate::triad::Physical>)| {
             let own = pick(own.as_ref()?);
             let left_out = common.left_out[s].as_ref();
