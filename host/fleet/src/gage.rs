@@ -278,8 +278,11 @@ fn modified_large_samples(squares: &[[f64; 3]]) -> Sigma {
             } else {
                 0.975
             };
-            let quantile = ChiSquared::new(*dof).map_or(*dof, |d| d.inverse_cdf(p));
-            (weight * square * (dof / quantile - 1.0)).powi(2)
+            let ratio = match ChiSquared::new(*dof) {
+                Ok(distribution) if dof.is_finite() => dof / distribution.inverse_cdf(p),
+                _ => 1.0,
+            };
+            (weight * square * (ratio - 1.0)).powi(2)
         });
         each.sum::<f64>().sqrt()
     };

@@ -118,12 +118,33 @@ impl Model<'_> {
         variances(&best.values)
     }
 
-    /// Covariance of the logarithms: the inverse of the observed information. A variance that is zero has none.
+    /// Covariance of the logarithms: the inverse of the observed information. A variance that is zero has none, nor one whose likelihood is flat: the
+    /// others would have no intervals for it.
     pub(super) fn covariance(&self, variances: &[f64]) -> DMatrix<f64> {
-        let inside: Vec<usize> = (0..variances.len())
+        let mut inside: Vec<usize> = (0..variances.len())
             .filter(|k| variances[*k] > 0.0)
             .collect();
-        let m = inside.len();
+        let mut out = DMatrix::zeros(variances.len(), variances.len());
+        while !inside.is_empty() {
+            let information = self.information(variances, &inside);
+            if let Some(factor) = information.clone().cholesky() {
+                let inverse = factor.inverse();
+                for (a, i) in inside.iter().enumerate() {
+                    for (b, j) in inside.iter().enumerate() {
+                        out[(*i, *j)] = inverse[(a, b)];
+                    }
+                }
+                break;
+            }
+            let own = |a: &usize| information[(*a, *a)];
+            let flattest = (0..inside.len()).min_by(|a, b| own(a).total_cmp(&own(b)));
+            inside.remove(flattest.unwrap_or_default());
+        }
+        out
+    }
+
+    /// Second differences of minus the logarithm of the likelihood by the logarithms of the variances `inside`.
+    fn information(&self, variances: &[f64], inside: &[usize]) -> DMatrix<f64> {
         let step = 0.05;
         let at = |moves: &[(usize, f64)]| {
             let mut there = variances.to_vec();
@@ -133,23 +154,14 @@ impl Model<'_> {
             0.5 * self.deviance(&there)
         };
         let centre = at(&[]);
-        let information = DMatrix::from_fn(m, m, |i, j| match i == j {
+        let m = inside.len();
+        DMatrix::from_fn(m, m, |i, j| match i == j {
             true => (at(&[(i, step)]) - 2.0 * centre + at(&[(i, -step)])) / (step * step),
             false => {
                 let corners = [(step, step), (step, -step), (-step, step), (-step, -step)];
                 let [pp, pm, mp, mm] = corners.map(|(a, b)| at(&[(i, a), (j, b)]));
                 (pp - pm - mp + mm) / (4.0 * step * step)
             }
-        });
-        let mut out = DMatrix::zeros(variances.len(), variances.len());
-        if let Some(factor) = information.cholesky() {
-            let inverse = factor.inverse();
-            for (a, i) in inside.iter().enumerate() {
-                for (b, j) in inside.iter().enumerate() {
-                    out[(*i, *j)] = inverse[(a, b)];
-                }
-            }
-        }
-        out
+        })
     }
 }
