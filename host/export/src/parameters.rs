@@ -86,6 +86,9 @@ pub struct Options {
     pub driver: driver::Options,
 }
 
+/// A triad, and the offset and factor of each of its axes, SI and SI per SI of the reading.
+pub(crate) type Offsets = (Sensor, Vector3<f64>, Vector3<f64>);
+
 impl Options {
     /// Device ids, as far as the user knows them. Autopilots store them bit by bit in signed parameters.
     pub fn ids(&self) -> PerSensor<Option<i32>> {
@@ -147,15 +150,11 @@ impl Options {
         Ok(())
     }
 
-    /// Offset and factor of each axis of the calibrated triads, SI and SI per SI of the reading; adds formulas, notes and the remaining errors.
+    /// Those of the calibrated triads; adds formulas, notes and the remaining errors.
     ///
     /// # Errors
     /// The calibration is missing, or an error of [`Conversion::of`].
-    pub(crate) fn offsets(
-        &self,
-        from: &Sources,
-        export: &mut Export,
-    ) -> Result<Vec<(Sensor, Vector3<f64>, Vector3<f64>)>> {
+    pub(crate) fn offsets(&self, from: &Sources, export: &mut Export) -> Result<Vec<Offsets>> {
         let (calibration, _) = from.calibration()?;
         let known = self.driver.conversions();
         export.formula("x = (v - offset) scale on each axis, raw to SI; v is the driver's output for a raw reading; a gyro has no scale.");

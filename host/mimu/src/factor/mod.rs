@@ -188,6 +188,9 @@ impl Factor<'_> {
     }
 }
 
+/// The turns that a factor is over, and the derivatives of each of its residuals by the rotation vectors of their increments, rad/rad, body frame.
+pub type ByIncrements = (Range<usize>, Vec<Vec<Vector3<f64>>>);
+
 /// A list of factors, with the turns that they refer to.
 #[derive(Default, Clone)]
 pub struct Factors<'a> {
@@ -384,13 +387,8 @@ impl<'a> Factors<'a> {
         out
     }
 
-    /// The turns that a kind of factor is over, and the derivatives of each of its residuals by the rotation vectors of their increments, rad/rad, body frame.
-    /// `None` of one in a dwell, where an error of all readings is one of o.
-    pub fn by_increments(
-        &self,
-        kind: &Kind,
-        gyro: &Affine<f64>,
-    ) -> Option<(Range<usize>, Vec<Vec<Vector3<f64>>>)> {
+    /// What a kind of factor over turns depends on; `None` of one in a dwell, where an error of all readings is one of o.
+    pub fn by_increments(&self, kind: &Kind, gyro: &Affine<f64>) -> Option<ByIncrements> {
         match kind {
             Kind::Turn(t, _) => {
                 let (_, by) = TurnError::with_increments(&self.turns[*t], gyro);

@@ -89,7 +89,7 @@ pub(super) struct ForeignFile {
 #[derive(Debug)]
 enum Rows {
     Table(Box<table::Table>),
-    Log(Readings, Noticed),
+    Log(Box<Readings>, Noticed),
 }
 
 /// A cell that becomes a value of a row.
@@ -180,7 +180,7 @@ impl ForeignFile {
                     warnings: std::mem::take(&mut readings.warnings),
                     ..Noticed::default()
                 };
-                (Rows::Log(readings, noticed), parts)
+                (Rows::Log(Box::new(readings), noticed), parts)
             }
             false => {
                 let format = how.log.text_format();

@@ -115,8 +115,10 @@ fn round(
     (model, up): (&Affine<f64>, &Affine<f64>),
     power_ons: &PowerOns,
 ) -> Option<(Vec<[Vector3<f64>; 2]>, f64)> {
-    let mut models = Models::default();
-    models.accel = Some(*up);
+    let mut models = Models {
+        accel: Some(*up),
+        ..Models::default()
+    };
     models[sensor] = Some(*model);
     let judging = Judging::of(moved, sensor, &models)?;
     let mut factors = judging.factors;
