@@ -72,11 +72,14 @@ impl Line {
         let above_floor = welch.power[band.peak] / floor;
         let rms = excess.power.sqrt();
         let width_hz = excess.quantile_hz(0.75) - excess.quantile_hz(0.25);
+        let resolution_hz = line_width_hz(welch);
+        // Few bins of a narrow bump exceed half of its peak by chance, but the middle half of a line's power is within one resolution.
+        let is_bump = band.resolved || width_hz > resolution_hz;
         Self {
             frequency_hz: excess.quantile_hz(0.5),
-            width_hz: band.resolved.then_some(width_hz),
+            width_hz: is_bump.then_some(width_hz),
             rms,
-            interval: match band.resolved {
+            interval: match is_bump {
                 true => excess.interval(confidence),
                 false => {
                     // A steady line and the noise at its frequency interfere: they give the power a relative variance of 4/(r n), at a density r times
@@ -87,7 +90,7 @@ impl Line {
                 }
             },
             above_floor,
-            resolution_hz: line_width_hz(welch),
+            resolution_hz,
             band_hz: resolution.ends_hz(band),
         }
     }
