@@ -81,7 +81,7 @@ def test_options_that_there_are_not_are_errors_of_type_or_value(arrays: mimu.Rec
     with pytest.raises(TypeError, match="qgroundcontrol"):
         mimu.export("px4", calibration=calibration, qgroundcontrol=True)
     with pytest.raises(ValueError, match="cannot be used with"):
-        mimu.design(n=3, scheme="six-face")
+        mimu.design(budget=10, sigma=0.01)
     with pytest.raises(mimu.Error, match="^only: invalid value 'best'.*accel"):
         mimu.fit(arrays, only="best")
     with pytest.raises(mimu.Error, match="one other recording"):
