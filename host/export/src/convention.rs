@@ -94,7 +94,7 @@ impl Convention {
     /// The numbers of these readings.
     ///
     /// # Errors
-    /// Those of [`misalignment`].
+    /// Those of `misalignment`.
     pub fn of(&self, readings: &Readings) -> Result<Parts> {
         let matrix = match self.maps {
             Maps::ToInput => readings.inverse.matrix,

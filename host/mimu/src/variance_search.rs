@@ -1,6 +1,6 @@
-//! The most likely variances of independent components, and the ranges that the likelihood leaves them: one search for every model, each with its own likelihood.
+//! The most likely variances of independent components, and the ranges that the likelihood leaves them.
 //!
-//! A variance is zero or a logarithm on [`RANGE`]; the likelihood is maximised along one of them after the other.
+//! A variance is zero or a logarithm on `RANGE`; the likelihood is maximised along one of them after the other.
 
 /// Logarithms of a value between which it is searched, in its unit.
 const RANGE: [f64; 2] = [-9.0, 18.0];

@@ -1,18 +1,15 @@
 //! Restricted maximum likelihood of the variances of a study.
 
 use mimu::nalgebra::DMatrix;
-use mimu::variance_search::Search;
 
 use super::Study;
 
-/// Unit of a variance in the search, of standard values: it is sought from 1e-8 to 6e3 of these.
-const UNIT: f64 = 1e-4;
-/// Smallest repeatability, a variance of standard values: the inverse of a block would have no end.
-const LEAST: f64 = 1e-12;
-/// A variance whose absence lowers the logarithm of the likelihood by less is zero: its own would have no curvature, and the others no intervals.
-const FLAT: f64 = 1e-6;
-/// Smallest step of the search in the logarithm of a variance.
-const FINEST: f64 = 1e-3;
+/// Logarithms of variances, of standard values, between which the maximum is sought. At the lowest a variance is zero.
+pub(super) const LOWEST: f64 = -18.0;
+const HIGHEST: f64 = 5.0;
+/// Sweeps over all variances, and the change that ends them.
+const SWEEPS: usize = 100;
+const CHANGE: f64 = 1e-7;
 
 /// Standard values of a study.
 pub(super) struct Model<'a> {
@@ -28,7 +25,11 @@ impl Model<'_> {
     /// Minus twice the restricted log-likelihood, without constants, of variances: repeatability, units, factors, interactions.
     ///
     /// Blocks of units are inverted one by one; factors, which connect units, by the identity of Woodbury.
-    fn deviance(&self, variances: &[f64]) -> f64 {
+    fn deviance(&self, logs: &[f64]) -> f64 {
+        let variances: Vec<f64> = logs
+            .iter()
+            .map(|l| if *l <= LOWEST { 0.0 } else { l.exp() })
+            .collect();
         let sizes = self
             .study
             .factors
@@ -45,7 +46,7 @@ impl Model<'_> {
         let mut products = DMatrix::<f64>::zeros(q + 2, q + 2);
         let mut log_determinant = 0.0;
         for rows in &self.rows {
-            let Some(factor) = self.block(rows, variances).cholesky() else {
+            let Some(factor) = self.block(rows, &variances).cholesky() else {
                 return f64::INFINITY;
             };
             log_determinant += 2.0 * factor.l_dirty().diagonal().map(f64::ln).sum();
@@ -89,79 +90,100 @@ impl Model<'_> {
         DMatrix::from_fn(rows.len(), rows.len(), |i, j| {
             let same = self.cells.iter().zip(interactions);
             let same = same.filter(|(cells, _)| cells[rows[i]] == cells[rows[j]]);
-            let own = if i == j { variances[0].max(LEAST) } else { 0.0 };
+            let own = if i == j { variances[0].max(1e-12) } else { 0.0 };
             variances[1] + own + same.map(|(_, v)| v).sum::<f64>()
         })
     }
 
-    /// The variances with the greatest restricted likelihood.
+    /// Logarithms of the variances with the greatest restricted likelihood, found one by one in turn.
     pub(super) fn maximise(&self) -> Vec<f64> {
         let count = 2 + self.study.factors.len() + self.cells.len();
-        let variances = |values: &[f64]| values.iter().map(|v| UNIT * v).collect::<Vec<f64>>();
-        let search = Search {
-            of: |values: &[f64]| Some(-0.5 * self.deviance(&variances(values))),
-            most: vec![f64::INFINITY; count],
-            finest: FINEST,
-        };
-        let start = search.fitted(vec![1.0 / (UNIT * count as f64); count]);
-        let all: Vec<usize> = (0..count).collect();
-        let mut best = search.maximise(start, &all);
-        // Repeatability is never zero.
-        for k in 1..count {
-            let mut values = best.values.clone();
-            values[k] = 0.0;
-            let without = search.fitted(values);
-            if without.log_likelihood > best.log_likelihood - FLAT {
-                best = without;
+        let mut logs = vec![(1.0 / count as f64).ln(); count];
+        let mut step = 2.0;
+        for _ in 0..SWEEPS {
+            let before = self.deviance(&logs);
+            let start = logs.clone();
+            for k in 0..count {
+                self.along(&mut logs, k, step);
             }
-        }
-        variances(&best.values)
-    }
-
-    /// Covariance of the logarithms: the inverse of the observed information. A variance that is zero has none, nor one whose likelihood is flat: the
-    /// others would have no intervals for it.
-    pub(super) fn covariance(&self, variances: &[f64]) -> DMatrix<f64> {
-        let mut inside: Vec<usize> = (0..variances.len())
-            .filter(|k| variances[*k] > 0.0)
-            .collect();
-        let mut out = DMatrix::zeros(variances.len(), variances.len());
-        while !inside.is_empty() {
-            let information = self.information(variances, &inside);
-            if let Some(factor) = information.clone().cholesky() {
-                let inverse = factor.inverse();
-                for (a, i) in inside.iter().enumerate() {
-                    for (b, j) in inside.iter().enumerate() {
-                        out[(*i, *j)] = inverse[(a, b)];
-                    }
-                }
+            let moved = logs
+                .iter()
+                .zip(&start)
+                .map(|(a, b)| (a - b).abs())
+                .fold(0.0, f64::max);
+            if before - self.deviance(&logs) < CHANGE && moved < 1e-3 {
                 break;
             }
-            let own = |a: &usize| information[(*a, *a)];
-            let flattest = (0..inside.len()).min_by(|a, b| own(a).total_cmp(&own(b)));
-            inside.remove(flattest.unwrap_or_default());
+            step = (2.0 * moved).clamp(1e-3, 4.0);
         }
-        out
+        logs
     }
 
-    /// Second differences of minus the logarithm of the likelihood by the logarithms of the variances `inside`.
-    fn information(&self, variances: &[f64], inside: &[usize]) -> DMatrix<f64> {
+    /// The best value of variance `k`, by golden sections around the present one and at zero.
+    fn along(&self, logs: &mut [f64], k: usize, step: f64) {
+        let at = |log: f64, logs: &mut [f64]| {
+            logs[k] = log;
+            self.deviance(logs)
+        };
+        let present = logs[k].max(LOWEST + 1.0);
+        let [mut low, mut high] =
+            [present - step, present + step].map(|l| l.clamp(LOWEST, HIGHEST));
+        let golden = 0.5 * (5f64.sqrt() - 1.0);
+        let inner =
+            |low: f64, high: f64| [high - golden * (high - low), low + golden * (high - low)];
+        let [mut a, mut b] = inner(low, high);
+        let (mut of_a, mut of_b) = (at(a, logs), at(b, logs));
+        while high - low > 2e-5 * step.max(0.05) {
+            if of_a < of_b {
+                (high, b, of_b) = (b, a, of_a);
+                a = inner(low, high)[0];
+                of_a = at(a, logs);
+            } else {
+                (low, a, of_a) = (a, b, of_b);
+                b = inner(low, high)[1];
+                of_b = at(b, logs);
+            }
+        }
+        let best = 0.5 * (low + high);
+        let (at_best, at_zero) = (at(best, logs), at(LOWEST, logs));
+        // Repeatability is never zero: the inverse of a block would have no end.
+        logs[k] = if k > 0 && at_zero <= at_best + 1e-9 {
+            LOWEST
+        } else {
+            best
+        };
+    }
+
+    /// Covariance of the logarithms: the inverse of the observed information. A variance that is zero has none.
+    pub(super) fn covariance(&self, logs: &[f64]) -> DMatrix<f64> {
+        let inside: Vec<usize> = (0..logs.len()).filter(|k| logs[*k] > LOWEST).collect();
+        let m = inside.len();
         let step = 0.05;
         let at = |moves: &[(usize, f64)]| {
-            let mut there = variances.to_vec();
+            let mut there = logs.to_vec();
             for (k, by) in moves {
-                there[inside[*k]] *= by.exp();
+                there[inside[*k]] += by;
             }
             0.5 * self.deviance(&there)
         };
         let centre = at(&[]);
-        let m = inside.len();
-        DMatrix::from_fn(m, m, |i, j| match i == j {
+        let information = DMatrix::from_fn(m, m, |i, j| match i == j {
             true => (at(&[(i, step)]) - 2.0 * centre + at(&[(i, -step)])) / (step * step),
             false => {
                 let corners = [(step, step), (step, -step), (-step, step), (-step, -step)];
                 let [pp, pm, mp, mm] = corners.map(|(a, b)| at(&[(i, a), (j, b)]));
                 (pp - pm - mp + mm) / (4.0 * step * step)
             }
-        })
+        });
+        let mut out = DMatrix::zeros(logs.len(), logs.len());
+        if let Some(factor) = information.cholesky() {
+            let inverse = factor.inverse();
+            for (a, i) in inside.iter().enumerate() {
+                for (b, j) in inside.iter().enumerate() {
+                    out[(*i, *j)] = inverse[(a, b)];
+                }
+            }
+        }
+        out
     }
 }
