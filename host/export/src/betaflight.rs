@@ -40,7 +40,7 @@ impl Target for Betaflight {
     const PAGES: &[Page] = &[Page::of("Betaflight", "betaflight.txt")];
 
     /// # Errors
-    /// No accelerometer is calibrated, C is singular, or a bias is no number of 16 bits.
+    /// No accelerometer is calibrated, C is singular, or a bias does not fit into 16 bits.
     fn export(from: &Sources, options: &Options) -> Result<Export> {
         let mut export = Export::new::<Self>(from);
         export.formula(format!(

@@ -326,7 +326,7 @@ impl Header {
         Ok(false)
     }
 
-    /// Why none of `lines` is a row.
+    /// Why no line of `lines` is a row.
     fn no_row(&self, lines: &[&[u8]], list: Option<&ColumnList>, search: Search) -> Error {
         if self.wanted.is_empty() {
             let error = self.no_header(list, &search.names);

@@ -24,7 +24,7 @@ pub(super) enum Meaning {
     Temperature,
     /// Number or label of a dwell.
     Step,
-    /// A running number. It is no time: a logger may count from any rate.
+    /// A running number. It does not give times: a logger may count at any rate.
     Counter,
     /// A known input of a table, by the recording's own name.
     Reference(&'static str),
@@ -52,7 +52,7 @@ const COUNTER: &str = "index idx sample samples counter count cnt ctr packetcoun
 const OF_AN_ANGLE: &str = "rate rates speed dot vel velocity angularrate gyro";
 /// Words that say nothing: units, and what every logger may write.
 const EMPTY: &str = "dps mdps rad mrad deg rads degs radps degps rps mps mps2 ms2 mg gs mss raw imu sensor body b data value val field msg";
-/// The name without its unit: what stands in brackets, unless it is an index, and units behind it.
+/// The name without its unit: the text in brackets, unless it is an index, and units behind it.
 fn without_unit(name: &str) -> String {
     let mut bare = String::new();
     let mut rest = name.trim();
@@ -108,7 +108,7 @@ fn sensor(stem: &str) -> Option<fn(usize) -> Meaning> {
 fn axis_of(words: &[String]) -> Option<(usize, String)> {
     let axes = ["x", "y", "z"];
     let plain = |word: &str| axes.iter().position(|a| *a == word);
-    // A word of its own, from the end on.
+    // A separate word, from the end on.
     if let Some((at, axis)) = (0..words.len())
         .rev()
         .find_map(|k| Some((k, plain(&words[k])?)))

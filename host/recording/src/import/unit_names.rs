@@ -51,7 +51,7 @@ pub(super) fn is_unit_of_time(word: &str) -> bool {
     ["s", "ms", "us", "ns", "sec"].contains(&word)
 }
 
-/// Whether `text` has one of the spellings as a word of its own.
+/// Whether `text` has one of the spellings as a separate word.
 fn spelled(text: &str, spellings: &str) -> bool {
     let text = text.to_lowercase();
     let part = |c: Option<char>| {
@@ -80,7 +80,7 @@ pub(super) fn rate_unit(text: &str) -> Option<&'static str> {
     of(text, &RATES).or_else(|| text.contains(ROS[0]).then_some("rad/s"))
 }
 
-/// The unit of an accelerometer. A `g` of its own is a unit only in brackets or at the end: `acc_g_x` may be an accelerometer of the group g.
+/// The unit of an accelerometer. A separate `g` is a unit only in brackets or at the end: `acc_g_x` may be an accelerometer of the group g.
 pub(super) fn force_unit(text: &str) -> Option<&'static str> {
     of(text, &FORCES).or_else(|| text.contains(ROS[1]).then_some("m/s²"))
 }
