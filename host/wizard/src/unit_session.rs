@@ -277,7 +277,8 @@ impl UnitSession {
         (last.fold(0.0, f64::max) * rate_hz) as u64 + (10.0 * rate_hz) as u64
     }
 
-    /// Processes all events. Adds reports to `tell`; returns whether there were events.
+    /// Processes all events up to the end of the dwell. Those after it wait for the next step: on a slow computer they may hold all of its dwell. Adds
+    /// reports to `tell`; returns whether there were events.
     pub fn listen(&mut self, round: &Round<'_>, tell: &mut Vec<Event>) -> Result<bool> {
         let mut some = false;
         while let Some(news) = self.station.news()? {
@@ -293,6 +294,9 @@ impl UnitSession {
                         self.stand(&seen, round.config, round.step);
                         if let (Some(step), false) = (round.step, self.done) {
                             self.update_dwell(&seen, round, step, tell)?;
+                            if self.done {
+                                break;
+                            }
                         }
                     }
                 }

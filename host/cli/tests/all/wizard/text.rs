@@ -107,7 +107,7 @@ fn a_board_that_writes_lines_ends_in_a_calibration_whose_intervals_hold_its_para
     let id = rustix::process::Pid::from_child(&child);
     let (ended, end) = std::sync::mpsc::channel::<()>();
     std::thread::spawn(move || {
-        if end.recv_timeout(Duration::from_secs(60)).is_err() {
+        if end.recv_timeout(Duration::from_secs(600)).is_err() {
             let _ = rustix::process::kill_process(id, rustix::process::Signal::TERM);
         }
     });
