@@ -13,7 +13,7 @@ ON_PC := --workspace --exclude mimu-counted --exclude mimu-no-panic --features m
 
 MDBOOK := 0.5.4
 LOWEST := $(shell sed -n 's/^rust-version = "\(.*\)"/\1/p' Cargo.toml)
-PUBLISHED := mimu-core mimu-recording mimu-allan mimu mimu-thermal mimu-device mimu-equipment mimu-export mimu-fleet mimu-wizard mimu-station mimu-cli
+PUBLISHED := mimu-core mimu-recording mimu-allan mimu mimu-thermal mimu-body mimu-device mimu-equipment mimu-export mimu-fleet mimu-wizard mimu-station mimu-cli
 
 # Written when all tests have been built. Their build has the programs of the demo too, with other features of the dependencies than a build of these
 # programs alone, which would compile everything again.

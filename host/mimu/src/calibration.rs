@@ -2,6 +2,7 @@
 
 pub mod apply;
 pub mod bias_cubic;
+pub mod body;
 mod check;
 pub mod comparison;
 pub mod die_temperature;
@@ -31,6 +32,8 @@ use std::path::Path;
 use mimu_core::compensation::Affine;
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
+
+use body::BodyTriad;
 
 use crate::effects::fitted::FittedEffect;
 use crate::judgement::Judgement;
@@ -132,6 +135,9 @@ pub struct Calibration {
     /// Errors that the affine models lack.
     #[serde(default, rename = "effect", skip_serializing_if = "Vec::is_empty")]
     effects: Vec<FittedEffect>,
+    /// The triads of its body beyond these two.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub body: Vec<BodyTriad>,
 }
 
 /// What the schema says of [`SensorSettings`] and of [`ClockRate`].

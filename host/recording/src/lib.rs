@@ -42,6 +42,7 @@ mod strict_file;
 #[cfg(test)]
 mod tests;
 mod toml_file;
+mod triad_name;
 mod turntable;
 mod unit_name;
 mod warning;
@@ -74,6 +75,7 @@ pub use recorded::{Recorded, Restart, SensorSetting, SensorSettings};
 pub use reference_error::{NORMAL_95, ReferenceError};
 pub use separator::Separator;
 pub use toml_file::{check_kind, parse_toml, read_text};
+pub use triad_name::{TriadKind, TriadName};
 pub use turntable::{Turntable, TurntableRate, rate_error};
 pub use unit_name::{UNNAMED, are_two_units, two_units};
 pub use warning::Warning;

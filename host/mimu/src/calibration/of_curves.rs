@@ -105,6 +105,7 @@ impl Calibration {
             gyro: table(Sensor::Gyro),
             accel: table(Sensor::Accel),
             effects: Vec::new(),
+            body: Vec::new(),
             temperature: Some(unit.temperature),
         };
         calibration.checked(&format!("calibration of {:?}", unit.device))

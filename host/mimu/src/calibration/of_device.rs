@@ -88,6 +88,7 @@ impl Calibration {
             accel: Some(triad(&node.model.accel, Sensor::Accel)?),
             temperature,
             effects: FittedEffect::all_of_device(&stored.effects).map_err(unknown)?,
+            body: Vec::new(),
         };
         calibration.checked(place)
     }

@@ -61,6 +61,7 @@ impl Calibration {
             accel: triad(Sensor::Accel),
             temperature: None,
             effects: lasting.collect(),
+            body: Vec::new(),
         };
         calibration.checked(&format!("calibration of {:?}", manifest.device))
     }

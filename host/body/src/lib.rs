@@ -1,0 +1,1 @@
+//! A body of triads: magnetometers and further inertial units on one carrier.
