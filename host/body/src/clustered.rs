@@ -52,7 +52,12 @@ impl Solution {
 impl Clusters {
     /// So many clusters and parameters. `known`: standard deviations of what is known beforehand, infinite for nothing, around `value` of which the
     /// parameters are now at `at`.
-    pub fn new(count: usize, at: &DVector<f64>, value: &DVector<f64>, known: &DVector<f64>) -> Self {
+    pub fn new(
+        count: usize,
+        at: &DVector<f64>,
+        value: &DVector<f64>,
+        known: &DVector<f64>,
+    ) -> Self {
         let n = at.len();
         let precision = known.map(|sigma| sigma.powi(-2));
         Self {
@@ -108,8 +113,8 @@ impl Clusters {
             own.fill_upper_triangle_with_lower_triangle();
             // Its gradient at the solution.
             let left = &cluster.gradient - &own * &step;
-            let squares = cluster.squares - 2.0 * step.dot(&cluster.gradient)
-                + step.dot(&(&own * &step));
+            let squares =
+                cluster.squares - 2.0 * step.dot(&cluster.gradient) + step.dot(&(&own * &step));
             let without = match used {
                 true => inverse(&(&normal - &own)),
                 false => Some(by_weights.clone()),
@@ -208,7 +213,9 @@ mod tests {
     #[test]
     fn errors_in_common_to_a_cluster_widen_the_interval_to_what_holds() {
         let runs: Vec<_> = (0..200).map(line).collect();
-        let inside = runs.iter().filter(|(slope, s)| (slope - 2.0).abs() < 2.02 * s);
+        let inside = runs
+            .iter()
+            .filter(|(slope, s)| (slope - 2.0).abs() < 2.02 * s);
         let share = inside.count() as f64 / 200.0;
         assert!((0.90..=0.99).contains(&share), "{share}");
     }

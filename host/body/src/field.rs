@@ -175,8 +175,16 @@ impl<'a> Problem<'a> {
     /// hold for the opposite field too.
     fn start(&self) -> Option<DVector<f64>> {
         let count = self.used.len() as f64;
-        let mean = self.used.iter().map(|k| self.raw.x[*k]).sum::<Vector3<f64>>() / count;
-        let squares = self.used.iter().map(|k| (self.raw.x[*k] - mean).norm_squared());
+        let mean = self
+            .used
+            .iter()
+            .map(|k| self.raw.x[*k])
+            .sum::<Vector3<f64>>()
+            / count;
+        let squares = self
+            .used
+            .iter()
+            .map(|k| (self.raw.x[*k] - mean).norm_squared());
         let scale = (squares.sum::<f64>() / count / 3.0).sqrt();
         if !(scale > 0.0) || self.pairs.len() < COUNT {
             return None;
@@ -202,16 +210,25 @@ impl<'a> Problem<'a> {
         }
         at.fixed_rows_mut::<3>(9).copy_from(&offset);
         let calibration = Affine { matrix, offset };
-        let sines = self.rests.iter().map(|(u, up, _)| -up.dot(&calibration.apply(u)) / self.size);
+        let sines = self
+            .rests
+            .iter()
+            .map(|(u, up, _)| -up.dot(&calibration.apply(u)) / self.size);
         at[DIP] = sines.sum::<f64>() / self.rests.len().max(1) as f64;
         at.iter().all(|x| x.is_finite()).then_some(at)
     }
 
     /// Residual after a turn, and its derivatives, an axis each.
-    fn turn(&self, [from, to]: [usize; 2], at: &DVector<f64>) -> Option<(Vector3<f64>, DMatrix<f64>)> {
+    fn turn(
+        &self,
+        [from, to]: [usize; 2],
+        at: &DVector<f64>,
+    ) -> Option<(Vector3<f64>, DMatrix<f64>)> {
         let calibration = affine(&at.fixed_rows::<12>(0).into_owned());
         let between = |delay: f64| {
-            let turn = self.motion.turn(self.raw.t[from] - delay, self.raw.t[to] - delay)?;
+            let turn = self
+                .motion
+                .turn(self.raw.t[from] - delay, self.raw.t[to] - delay)?;
             Some(*turn.to_rotation_matrix().matrix())
         };
         let turn: Matrix3<f64> = between(at[DELAY])?;
@@ -225,7 +242,12 @@ impl<'a> Problem<'a> {
         Some((turn * x0 - x1, by))
     }
 
-    fn settle(&self, at: &mut DVector<f64>, groups: &mut Groups, used: &[bool]) -> Option<Solution> {
+    fn settle(
+        &self,
+        at: &mut DVector<f64>,
+        groups: &mut Groups,
+        used: &[bool],
+    ) -> Option<Solution> {
         let mut last = None;
         for _ in 0..STEPS {
             let solution = self.clusters(at, groups, used).solve(used)?;
@@ -265,7 +287,10 @@ impl<'a> Problem<'a> {
             for axis in 0..3 {
                 clusters.add(piece, residual[axis], &by.row(axis).transpose(), weight);
             }
-            clusters.correct(piece, &of_matrix(&(2.0 * weight * self.noise * calibration.matrix)));
+            clusters.correct(
+                piece,
+                &of_matrix(&(2.0 * weight * self.noise * calibration.matrix)),
+            );
         }
         let shift = self.noise * calibration.matrix.norm_squared() / 3.0 / self.size;
         for &k in &self.used {

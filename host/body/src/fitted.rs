@@ -162,7 +162,8 @@ mod tests {
     fn a_triad_that_is_turned_is_itself_and_its_rotation() {
         // Sensors with these directions by rows (lower triangular), in a chip turned by 170 degrees about (1, 2, 3).
         let own = Matrix3::new(2.0, 0.0, 0.0, 0.02, 1.9, 0.0, -0.03, 0.01, 2.1);
-        let rotation = Rotation3::new(Vector3::new(1.0, 2.0, 3.0).normalize() * 170f64.to_radians());
+        let rotation =
+            Rotation3::new(Vector3::new(1.0, 2.0, 3.0).normalize() * 170f64.to_radians());
         let forward = own * rotation.matrix().transpose();
         let matrix = forward.try_inverse().unwrap();
         let offset = Vector3::new(0.3, -0.2, 0.1);
@@ -183,7 +184,10 @@ mod tests {
         let offset = Vector3::zeros();
         let found = placed(&Affine { matrix, offset }, &[part]).unwrap();
         let sigmas = found.rotation_deg.map(|e| e.sigma.to_radians());
-        assert!((sigmas[2] - 1e-3).abs() < 1e-8 && sigmas[0] < 1e-8, "{sigmas:?}");
+        assert!(
+            (sigmas[2] - 1e-3).abs() < 1e-8 && sigmas[0] < 1e-8,
+            "{sigmas:?}"
+        );
         assert!(found.triad.inverse_covariance.norm() < 1e-12);
     }
 }

@@ -115,7 +115,11 @@ impl<'a> Carrier<'a> {
             let dwells = unit.prepared.dwells.list.iter();
             let own = dwells.filter(|d| d.faults.accel.is_none() && !d.spins() && !d.turn);
             own.filter_map(|d| {
-                let force = accel.estimated.triad.inverse.apply(&d.raw_mean(Sensor::Accel));
+                let force = accel
+                    .estimated
+                    .triad
+                    .inverse
+                    .apply(&d.raw_mean(Sensor::Accel));
                 Some(Rest {
                     from_s: d.start_s,
                     to_s: d.start_s + d.duration_s,
@@ -157,7 +161,10 @@ impl<'a> Carrier<'a> {
         raw: &Series,
     ) -> std::result::Result<FittedTriad, Judgement> {
         let (sensor, found) = match kind {
-            TriadKind::Gyro => (Sensor::Gyro, self.motion.as_ref().map(|(m, n)| (&m.rate, *n))),
+            TriadKind::Gyro => (
+                Sensor::Gyro,
+                self.motion.as_ref().map(|(m, n)| (&m.rate, *n)),
+            ),
             _ => (Sensor::Accel, self.force.as_ref().map(|(f, n)| (f, *n))),
         };
         let unit = self.unit.sensor(sensor);
@@ -186,15 +193,19 @@ impl<'a> Carrier<'a> {
         let at = |k: usize, scale: f64| estimate(&relation.covariance, relation.dof, k, scale);
         let delay_ms = match delay < DETERMINED {
             true => Ok(at(12, 1e3)(relation.delay_s)),
-            false => Err("its readings change too slowly to show a delay: turn and shake the body".to_string()),
+            false => Err(
+                "its readings change too slowly to show a delay: turn and shake the body"
+                    .to_string(),
+            ),
         };
         let lever_arm_mm = match (kind, motion) {
             (TriadKind::Gyro, _) => Err("a gyro reads the same everywhere on a body".to_string()),
             (_, None) => Err("without a gyro no rate is known".to_string()),
-            _ if arm < DETERMINED => {
-                Ok([0, 1, 2].map(|i| at(13 + i, 1e3)(relation.arm_m[i])))
-            }
-            _ => Err("the body turns too slowly to show a lever arm: turn it faster, about two axes".to_string()),
+            _ if arm < DETERMINED => Ok([0, 1, 2].map(|i| at(13 + i, 1e3)(relation.arm_m[i]))),
+            _ => Err(
+                "the body turns too slowly to show a lever arm: turn it faster, about two axes"
+                    .to_string(),
+            ),
         };
         let signal = series.x.iter().map(|x| x.norm_squared()).sum::<f64>() / series.len() as f64;
         Ok(FittedTriad {
@@ -223,7 +234,12 @@ impl<'a> Carrier<'a> {
         raw: Series,
         options: &Options,
     ) -> std::result::Result<FittedTriad, Judgement> {
-        let Some((motion, gyro)) = self.motion.as_ref().map(|(m, _)| m).zip(self.unit.sensor(Sensor::Gyro)) else {
+        let Some((motion, gyro)) = self
+            .motion
+            .as_ref()
+            .map(|(m, _)| m)
+            .zip(self.unit.sensor(Sensor::Gyro))
+        else {
             return Err(judge::undetermined(
                 "the first gyro, whose turns it is compared with, is not calibrated",
             ));
@@ -251,7 +267,11 @@ impl<'a> Carrier<'a> {
         Ok(FittedTriad {
             name,
             reference: TriadName::first(TriadKind::Gyro),
-            unit: if options.field_ut.is_some() { "uT" } else { "field" },
+            unit: if options.field_ut.is_some() {
+                "uT"
+            } else {
+                "field"
+            },
             judgement: judge::field(&field, size),
             triad: placed.triad,
             rotation: placed.rotation,

@@ -96,7 +96,11 @@ impl Groups {
         let any = self.variance.iter().flatten().copied();
         let other = any.fold(f64::NAN, f64::max);
         let variance = self.variance[group].unwrap_or(other);
-        if variance.is_nan() { 1.0 } else { variance.recip() }
+        if variance.is_nan() {
+            1.0
+        } else {
+            variance.recip()
+        }
     }
 
     /// Scatter of a group, as a variance; `None` if it has too few residuals.
@@ -118,7 +122,10 @@ mod tests {
     fn neighbouring_pieces_that_are_left_out_are_one_span() {
         let t: Vec<f64> = (0..=200).map(f64::from).collect();
         let pieces = Pieces::over(&t).unwrap();
-        assert_eq!((pieces.count, pieces.of(200.0), pieces.of(9.9)), (40, 39, 1));
+        assert_eq!(
+            (pieces.count, pieces.of(200.0), pieces.of(9.9)),
+            (40, 39, 1)
+        );
         let mut held = vec![1.0; 40];
         (held[3], held[4], held[20], held[7]) = (10.0, 99.0, 9.5, f64::NAN);
         let used = pieces.kept(&held);

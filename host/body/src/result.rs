@@ -141,19 +141,29 @@ impl TriadResult {
         });
         let physical = of.triad.physical(Angles::Exact);
         let kinds = [
-            (ParameterKind::Scale, physical.scale, scale_unit(raw, of.unit)),
-            (ParameterKind::NonOrthogonality, physical.non_orthogonality, "rad".into()),
+            (
+                ParameterKind::Scale,
+                physical.scale,
+                scale_unit(raw, of.unit),
+            ),
+            (
+                ParameterKind::NonOrthogonality,
+                physical.non_orthogonality,
+                "rad".into(),
+            ),
             (ParameterKind::Bias, physical.bias, raw_unit(raw, of.unit)),
         ];
         let physical = kinds.into_iter().flat_map(|(kind, estimates, unit)| {
             let each = estimates.into_iter().enumerate();
             each.map(move |(k, estimate)| (TriadParameter(kind, k), estimate, unit.clone()))
         });
-        let parameters = inverse.chain(physical).map(|(name, estimate, unit)| ParameterResult {
-            name: name.to_string(),
-            estimate: estimate.into(),
-            unit,
-        });
+        let parameters = inverse
+            .chain(physical)
+            .map(|(name, estimate, unit)| ParameterResult {
+                name: name.to_string(),
+                estimate: estimate.into(),
+                unit,
+            });
         Self {
             parameters: parameters.collect(),
             rms: of.rms,
@@ -175,15 +185,15 @@ impl PlaceResult {
             name: &'static str,
             of: &Known<T>,
         ) -> Option<T> {
-            of.clone()
-                .map_err(|why| reasons.insert(name, why))
-                .ok()
+            of.clone().map_err(|why| reasons.insert(name, why)).ok()
         }
         let mut reasons = BTreeMap::new();
         let delay_ms = known(&mut reasons, "delay_ms", &of.delay_ms).map(Into::into);
         let arm = known(&mut reasons, "lever_arm_mm", &of.lever_arm_mm);
         let dip = of.dip_deg.as_ref();
-        let dip_deg = dip.and_then(|dip| known(&mut reasons, "dip_deg", dip)).map(Into::into);
+        let dip_deg = dip
+            .and_then(|dip| known(&mut reasons, "dip_deg", dip))
+            .map(Into::into);
         Self {
             triad: of.name,
             reference: of.reference,
@@ -213,7 +223,8 @@ fn table(of: &FittedTriad, raw: RawUnit) -> BodyTriad {
     let rows = |value: fn(&Estimate) -> f64| {
         [0, 3, 6].map(|i| [i, i + 1, i + 2].map(|k| rounded(value(&estimates[k]), DIGITS)))
     };
-    let last = |value: fn(&Estimate) -> f64| [9, 10, 11].map(|k| rounded(value(&estimates[k]), DIGITS));
+    let last =
+        |value: fn(&Estimate) -> f64| [9, 10, 11].map(|k| rounded(value(&estimates[k]), DIGITS));
     let (delay, arm) = (of.delay_ms.as_ref().ok(), of.lever_arm_mm.as_ref().ok());
     let interval = |e: &Estimate| rounded(e.interval, DIGITS);
     BodyTriad {

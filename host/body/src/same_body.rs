@@ -164,8 +164,7 @@ impl<'a> Problem<'a> {
         if !(scaled.clone().symmetric_eigen().eigenvalues.min() > 1e-9) {
             return None;
         }
-        let found = scaled.try_inverse()?
-            * DMatrix::from_fn(4, 3, |i, j| right[(i, j)] / scale[i]);
+        let found = scaled.try_inverse()? * DMatrix::from_fn(4, 3, |i, j| right[(i, j)] / scale[i]);
         let mut at = DVector::zeros(self.parameters);
         for axis in 0..3 {
             for k in 0..3 {
@@ -220,8 +219,7 @@ impl<'a> Problem<'a> {
         let integral = self.integral(window, at[DELAY])?;
         let (sum, time) = self.raw_integral(window);
         let calibration = affine(&at.fixed_rows::<12>(0).into_owned());
-        let mut residual =
-            integral.sum - calibration.matrix * sum - calibration.offset * time;
+        let mut residual = integral.sum - calibration.matrix * sum - calibration.offset * time;
         let mut by = DMatrix::zeros(3, self.parameters);
         for axis in 0..3 {
             for k in 0..3 {
@@ -290,12 +288,7 @@ impl<'a> Problem<'a> {
         clusters
     }
 
-    fn relation(
-        &self,
-        at: &DVector<f64>,
-        solution: &Solution,
-        used: &[bool],
-    ) -> Option<Relation> {
+    fn relation(&self, at: &DVector<f64>, solution: &Solution, used: &[bool]) -> Option<Relation> {
         let calibration = affine(&at.fixed_rows::<12>(0).into_owned());
         // Noise of a mean of n samples, trapezoids: the ends count half.
         let per_window = (WINDOW_S / self.raw.period).max(FEWEST as f64);

@@ -235,7 +235,9 @@ mod tests {
     fn noise_is_found_beside_a_slow_motion() {
         let noise = |k: usize| 0.1 * ((k as f64 * 12.9898).sin() * 43758.5453).fract();
         let t: Vec<f64> = (0..4000).map(|k| 0.01 * k as f64).collect();
-        let x: Vec<f64> = (0..4000).map(|k| (0.01 * k as f64).sin() + noise(k)).collect();
+        let x: Vec<f64> = (0..4000)
+            .map(|k| (0.01 * k as f64).sin() + noise(k))
+            .collect();
         let found = Series::new(&t, [&x, &x, &x]).noise();
         // Uniform within ± 0.1: a variance of 0.1² / 3.
         assert!((found / (0.01 / 3.0) - 1.0).abs() < 0.25, "{found}");
