@@ -5,13 +5,16 @@
 //! gravity is one constant, the dip. An ellipsoid alone, the usual calibration, is the first of these: it leaves a rotation open, and a field that differs by place bends it
 //! unnoticed, where the turns contradict it.
 
-use mimu::triad::{Part, affine};
+use mimu::triad::{Part, affine, vector};
 use mimu_core::compensation::Affine;
 use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, Vector3};
 
+use crate::carrier::Rest;
 use crate::clustered::{Clusters, Solution};
+use crate::judge::Errors;
 use crate::pieces::{Groups, Pieces};
 use crate::series::{Motion, Series};
+use crate::verify::Standing;
 
 /// Time between two readings that are compared, s: long enough to turn far, and short enough that a gyro's bias of 0.1 deg/s is a tenth of a degree.
 pub(crate) const TURN_S: f64 = 1.0;
@@ -36,14 +39,6 @@ const TURNS: usize = 0;
 const SIZES: usize = 1;
 const DIPS: usize = 2;
 
-/// A rest: its times, s, and the direction up in the frame of the body.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Rest {
-    pub from_s: f64,
-    pub to_s: f64,
-    pub up: Vector3<f64>,
-}
-
 /// A calibrated magnetometer.
 pub(crate) struct Field {
     /// C and o, raw to the unit of `size`, in the frame of the body.
@@ -58,13 +53,8 @@ pub(crate) struct Field {
     pub delay_undetermined: f64,
     /// Number of rests that show the dip.
     pub rests: usize,
-    /// Rms of an axis after a turn, in sample, held out, by white noise; in the unit of the field.
-    pub rms: f64,
-    pub held_out_rms: f64,
-    pub noise_floor: f64,
-    /// Rms error of the size, in sample.
-    pub size_rms: f64,
-    pub turns: usize,
+    /// Errors of an axis after a turn, in the unit of the field.
+    pub errors: Errors,
     pub left_out: Vec<[f64; 2]>,
     /// Share of the pieces of time that is left out.
     pub left_out_share: f64,
@@ -107,6 +97,28 @@ impl Field {
             used = next;
         }
         problem.field(&at, &solution?, &mut groups, &used)
+    }
+
+    /// Errors of a magnetometer that stands so, and the size of the field: `size`, or else the mean that it reads. `None` if nothing turns.
+    pub fn errors(
+        raw: Series,
+        motion: &Motion,
+        standing: &Standing,
+        size: Option<f64>,
+    ) -> Option<(Errors, f64)> {
+        let raw = raw.without_repeats();
+        let sizes = raw.x.iter().map(|u| standing.calibration.apply(u).norm());
+        let size = size.unwrap_or(sizes.sum::<f64>() / raw.len() as f64);
+        let problem = Problem::new(raw, motion, &[], size)?;
+        let mut at = DVector::zeros(COUNT);
+        let Affine { matrix, offset } = standing.calibration;
+        at.fixed_rows_mut::<12>(0)
+            .copy_from(&vector(&matrix, &offset));
+        at[DELAY] = standing.delay_s;
+        Some((
+            problem.errors(&at, &vec![true; problem.pieces.count])?,
+            size,
+        ))
     }
 
     /// The part of the covariance of C and o.
@@ -325,6 +337,17 @@ impl<'a> Problem<'a> {
         clusters
     }
 
+    /// Errors in sample at these parameters, over the pieces of time that are `used`. `None` without a turn.
+    fn errors(&self, at: &DVector<f64>, used: &[bool]) -> Option<Errors> {
+        let calibration = affine(&at.fixed_rows::<12>(0).into_owned());
+        let per_axis = self.noise * calibration.matrix.norm_squared() / 3.0;
+        let own = |pair: &&[usize; 2]| used[self.pieces.of(self.raw.t[pair[0]])];
+        let squares = self.pairs.iter().filter(own);
+        let squares = squares.filter_map(|p| Some(self.turn(*p, at)?.0.norm_squared() / 3.0));
+        let squares: Vec<f64> = squares.collect();
+        Errors::of(&squares, 2.0 * per_axis)
+    }
+
     fn field(
         &self,
         at: &DVector<f64>,
@@ -345,8 +368,8 @@ impl<'a> Problem<'a> {
             }
             _ => f64::INFINITY,
         };
-        let rms = groups.variance(TURNS)?.sqrt();
-        let per_axis = self.noise * calibration.matrix.norm_squared() / 3.0;
+        let mut errors = self.errors(at, used)?;
+        errors.held_out_rms *= solution.unseen(used);
         let left = used.iter().filter(|used| !**used).count();
         Some(Field {
             worst_rad: self.worst(&calibration, &solution.covariance)?,
@@ -356,11 +379,7 @@ impl<'a> Problem<'a> {
             dip_sine: at[DIP],
             delay_undetermined: solution.by_weights[(DELAY, DELAY)].sqrt() / DELAY_S,
             rests: self.rests.len(),
-            rms,
-            held_out_rms: rms * solution.unseen(used),
-            noise_floor: (2.0 * per_axis).sqrt(),
-            size_rms: groups.variance(SIZES)?.sqrt(),
-            turns: self.pairs.len(),
+            errors,
             left_out: self.pieces.spans(used),
             left_out_share: left as f64 / used.len() as f64,
             halves_rad,

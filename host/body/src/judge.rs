@@ -4,7 +4,32 @@ use mimu::judgement::{Judgement, JudgementKind};
 use mimu::quantity::{Sensor, significant};
 
 use crate::field::Field;
-use crate::same_body::Relation;
+
+/// Rms errors over windows.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Errors {
+    /// In sample.
+    pub rms: f64,
+    /// In pieces of time that a fit has not used.
+    pub held_out_rms: f64,
+    /// By white noise alone.
+    pub noise_floor: f64,
+    /// Number of windows.
+    pub windows: usize,
+}
+
+impl Errors {
+    /// Of the mean squares of windows, where white noise has this variance; held out is as in sample. `None` without windows.
+    pub fn of(squares: &[f64], noise: f64) -> Option<Self> {
+        let rms = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
+        (!squares.is_empty()).then(|| Self {
+            rms,
+            held_out_rms: rms,
+            noise_floor: noise.sqrt(),
+            windows: squares.len(),
+        })
+    }
+}
 
 /// Held-out errors up to this many times those of white noise are those of noise: windows also hold what a bias wanders by.
 const BY_NOISE: f64 = 1.5;
@@ -23,16 +48,15 @@ pub(crate) fn undetermined(why: impl std::fmt::Display) -> Judgement {
 }
 
 /// Of a further gyro or accelerometer; `signal`: rms of an axis of the reference, SI.
-pub(crate) fn same_body(relation: &Relation, signal: f64, sensor: Sensor) -> Judgement {
-    let (held, floor) = (relation.held_out_rms, relation.noise_floor);
+pub(crate) fn same_body(errors: &Errors, signal: f64, sensor: Sensor) -> Judgement {
+    let (held, floor) = (errors.held_out_rms, errors.noise_floor);
     let of = |x: f64| format!("{} {}", significant(x), sensor.unit().replace("^2", "²"));
     if held > MISFIT_SHARE * signal {
-        let reason = format!(
+        return misfit(format!(
             "it does not read the motion of the first {sensor}: it differs by {} of {}; check its columns and its unit, and that both are on one rigid body",
             of(held),
             of(signal)
-        );
-        return Judgement::new(JudgementKind::Misfit, reason);
+        ));
     }
     if held > BY_NOISE * floor {
         let reason = format!(
@@ -64,38 +88,52 @@ pub(crate) fn determines(field: &Field) -> Result<(), Judgement> {
     )))
 }
 
+const MOVE_AWAY: &str = "move away from steel, motors and phones, and record again";
+
+fn misfit(reason: String) -> Judgement {
+    Judgement::new(JudgementKind::Misfit, reason)
+}
+
 /// Of a magnetometer; `size`: that of the field in the unit of its readings.
 pub(crate) fn field(field: &Field, size: f64) -> Judgement {
-    let degrees = |x: f64| significant((x / size).to_degrees());
-    let move_away = "move away from steel, motors and phones, and record again";
-    let misfit = |reason: String| Judgement::new(JudgementKind::Misfit, reason);
     if field.left_out_share > MOST_LEFT_OUT {
         return misfit(format!(
-            "the field differs from the rest in {:.0} % of the time: {move_away}",
+            "the field differs from the rest in {:.0} % of the time: {MOVE_AWAY}",
             100.0 * field.left_out_share
         ));
     }
-    if field.held_out_rms > MISFIT_RAD * size {
+    let again = field_again(&field.errors, size);
+    if field.halves_rad > MISFIT_RAD && again.needs_consent().is_none() {
         return misfit(format!(
-            "after a turn the field is off by {} deg (rms of an axis): {move_away}",
-            degrees(field.held_out_rms)
-        ));
-    }
-    if field.halves_rad > MISFIT_RAD {
-        return misfit(format!(
-            "the two halves of the recording give fields that differ by {} deg (rms): the field has changed, or each half turns too little; {move_away}",
+            "the two halves of the recording give fields that differ by {} deg (rms): the field has changed, or each half turns too little; {MOVE_AWAY}",
             significant(field.halves_rad.to_degrees())
         ));
     }
-    let [held, floor] = [field.held_out_rms, field.noise_floor].map(degrees);
-    if field.held_out_rms > BY_NOISE * field.noise_floor {
+    again
+}
+
+/// Of a magnetometer by its errors after turns.
+pub(crate) fn field_again(errors: &Errors, size: f64) -> Judgement {
+    let [held, floor] = [errors.held_out_rms, errors.noise_floor].map(|x| x / size);
+    let degrees = |x: f64| significant(x.to_degrees());
+    if held > MISFIT_RAD {
+        return misfit(format!(
+            "after a turn the field is off by {} deg (rms of an axis): {MOVE_AWAY}",
+            degrees(held)
+        ));
+    }
+    if held > BY_NOISE * floor {
         let reason = format!(
-            "after a turn the field is off by {held} deg in pieces of time that the fit has not used, and white noise explains {floor} deg"
+            "after a turn the field is off by {} deg in pieces of time that the fit has not used, and white noise explains {} deg",
+            degrees(held),
+            degrees(floor)
         );
         return Judgement::new(JudgementKind::Unexplained, reason);
     }
     let reason = format!(
-        "after a turn the field is off by {held} deg in pieces of time that the fit has not used, as white noise explains ({floor} deg)"
+        "after a turn the field is off by {} deg in pieces of time that the fit has not used, as white noise explains ({} deg)",
+        degrees(held),
+        degrees(floor)
     );
     Judgement::new(JudgementKind::Good, reason)
 }

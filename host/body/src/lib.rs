@@ -4,6 +4,7 @@
 //! kind in the motion that all feel (`same_body.rs`), magnetometers by what the Earth's field keeps while the body turns (`field.rs`). Each gets its calibration, its
 //! rotation, its delay, an accelerometer its lever arm, each with its interval; what a recording leaves open is not given, with the reason.
 
+mod carrier;
 mod clustered;
 mod field;
 mod fitted;
@@ -12,19 +13,22 @@ mod pieces;
 pub mod result;
 mod same_body;
 mod series;
+mod verify;
 
 use mimu::fit::Fit;
 use mimu::judgement::Judgement;
 use mimu::quantity::Sensor;
 use mimu::triad::{Estimate, half_width_95};
 use mimu_recording::error::{Error, Result};
-use mimu_recording::{Column, Recording, TriadKind, TriadName};
+use mimu_recording::{Recording, TriadKind, TriadName};
 
 pub use fitted::{FittedTriad, Known};
+pub use verify::{TriadVerification, verify};
 
-use field::{Field, Rest};
-use same_body::{Reference, Relation};
-use series::{Motion, Series};
+use carrier::{Carrier, read, rests};
+use field::Field;
+use same_body::Relation;
+use series::Series;
 
 /// What is given of a body.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -64,14 +68,21 @@ impl Body {
         if more.is_empty() {
             return Ok(None);
         }
-        let carrier = Carrier::read(recording, unit)?;
+        let models = mimu_core::PerSensor::from_fn(|sensor| {
+            unit.sensor(sensor)
+                .map(|found| found.estimated.triad.inverse)
+        });
+        let fitting = Fitting {
+            carrier: Carrier::read(recording, &models, rests(unit))?,
+            unit,
+        };
         let mut body = Self {
             triads: Vec::new(),
             refused: Vec::new(),
         };
         for name in more {
             let raw = read(recording, name)?;
-            match carrier.fitted(name, raw, options) {
+            match fitting.fitted(name, raw, options) {
                 Ok(triad) => body.triads.push(triad),
                 Err(why) => body.refused.push((name, why)),
             }
@@ -80,61 +91,13 @@ impl Body {
     }
 }
 
-/// Raw readings of a triad.
-fn read(recording: &Recording, name: TriadName) -> Result<Series> {
-    let columns = [0, 1, 2].map(|axis| Column::of(name, axis));
-    let columns = [Column::Time, columns[0], columns[1], columns[2]];
-    let all = recording.read_columns(&columns, |_| ())?;
-    Ok(Series::new(&all[0], [&all[1], &all[2], &all[3]]))
-}
-
-/// The first gyro and accelerometer, compensated.
-struct Carrier<'a> {
+/// The fit of the first two, and what it gives of them.
+struct Fitting<'a> {
     unit: &'a Fit,
-    motion: Option<(Motion, f64)>,
-    force: Option<(Series, f64)>,
-    rests: Vec<Rest>,
+    carrier: Carrier,
 }
 
-impl<'a> Carrier<'a> {
-    fn read(recording: &Recording, unit: &'a Fit) -> Result<Self> {
-        let series = |sensor: Sensor| -> Result<Option<(Series, f64)>> {
-            let Some(found) = unit.sensor(sensor) else {
-                return Ok(None);
-            };
-            let kind = match sensor {
-                Sensor::Gyro => TriadKind::Gyro,
-                Sensor::Accel => TriadKind::Accel,
-            };
-            let raw = read(recording, TriadName::first(kind))?;
-            let model = found.estimated.triad.inverse;
-            let noise = raw.noise() * model.matrix.norm_squared() / 3.0;
-            Ok(Some((raw.map(|u| model.apply(u)), noise)))
-        };
-        let rests = unit.sensor(Sensor::Accel).into_iter().flat_map(|accel| {
-            let dwells = unit.prepared.dwells.list.iter();
-            let own = dwells.filter(|d| d.faults.accel.is_none() && !d.spins() && !d.turn);
-            own.filter_map(|d| {
-                let force = accel
-                    .estimated
-                    .triad
-                    .inverse
-                    .apply(&d.raw_mean(Sensor::Accel));
-                Some(Rest {
-                    from_s: d.start_s,
-                    to_s: d.start_s + d.duration_s,
-                    up: force.try_normalize(1.0)?,
-                })
-            })
-        });
-        Ok(Self {
-            motion: series(Sensor::Gyro)?.map(|(rate, noise)| (Motion::new(rate), noise)),
-            force: series(Sensor::Accel)?,
-            rests: rests.collect(),
-            unit,
-        })
-    }
-
+impl Fitting<'_> {
     /// A further triad, or why it has no calibration.
     fn fitted(
         &self,
@@ -160,24 +123,15 @@ impl<'a> Carrier<'a> {
         kind: TriadKind,
         raw: &Series,
     ) -> std::result::Result<FittedTriad, Judgement> {
-        let (sensor, found) = match kind {
-            TriadKind::Gyro => (
-                Sensor::Gyro,
-                self.motion.as_ref().map(|(m, n)| (&m.rate, *n)),
-            ),
-            _ => (Sensor::Accel, self.force.as_ref().map(|(f, n)| (f, *n))),
+        let sensor = match kind {
+            TriadKind::Gyro => Sensor::Gyro,
+            _ => Sensor::Accel,
         };
-        let unit = self.unit.sensor(sensor);
-        let (Some((series, noise)), Some(unit)) = (found, unit) else {
+        let reference = self.carrier.reference(sensor);
+        let Some((reference, unit)) = reference.zip(self.unit.sensor(sensor)) else {
             return Err(judge::undetermined(format!(
                 "the first {sensor}, which it is compared with, is not calibrated"
             )));
-        };
-        let motion = self.motion.as_ref().map(|(motion, _)| motion);
-        let reference = Reference {
-            motion,
-            series,
-            noise,
         };
         let relation = Relation::of(kind, raw, &reference).ok_or_else(|| {
             judge::undetermined(match sensor {
@@ -198,7 +152,7 @@ impl<'a> Carrier<'a> {
                     .to_string(),
             ),
         };
-        let lever_arm_mm = match (kind, motion) {
+        let lever_arm_mm = match (kind, reference.motion) {
             (TriadKind::Gyro, _) => Err("a gyro reads the same everywhere on a body".to_string()),
             (_, None) => Err("without a gyro no rate is known".to_string()),
             _ if arm < DETERMINED => Ok([0, 1, 2].map(|i| at(13 + i, 1e3)(relation.arm_m[i]))),
@@ -207,23 +161,22 @@ impl<'a> Carrier<'a> {
                     .to_string(),
             ),
         };
-        let signal = series.x.iter().map(|x| x.norm_squared()).sum::<f64>() / series.len() as f64;
         Ok(FittedTriad {
             name,
             reference: TriadName::first(kind),
             unit: sensor.unit(),
-            judgement: judge::same_body(&relation, (signal / 3.0).sqrt(), sensor),
+            judgement: judge::same_body(&relation.errors, reference.signal(), sensor),
             triad: placed.triad,
             rotation: placed.rotation,
             rotation_deg: placed.rotation_deg,
             delay_ms,
             lever_arm_mm,
             dip_deg: None,
-            rms: relation.rms,
-            held_out_rms: relation.held_out_rms,
-            noise_floor: relation.noise_floor,
+            rms: relation.errors.rms,
+            held_out_rms: relation.errors.held_out_rms,
+            noise_floor: relation.errors.noise_floor,
             window_s: same_body::WINDOW_S,
-            windows: relation.windows,
+            windows: relation.errors.windows,
             left_out: relation.left_out,
         })
     }
@@ -234,19 +187,15 @@ impl<'a> Carrier<'a> {
         raw: Series,
         options: &Options,
     ) -> std::result::Result<FittedTriad, Judgement> {
-        let Some((motion, gyro)) = self
-            .motion
-            .as_ref()
-            .map(|(m, _)| m)
-            .zip(self.unit.sensor(Sensor::Gyro))
-        else {
+        let motion = self.carrier.motion();
+        let Some((motion, gyro)) = motion.zip(self.unit.sensor(Sensor::Gyro)) else {
             return Err(judge::undetermined(
                 "the first gyro, whose turns it is compared with, is not calibrated",
             ));
         };
         let size = options.field_ut.unwrap_or(1.0);
         let raw = raw.without_repeats();
-        let field = Field::of(raw, motion, &self.rests, size).ok_or_else(|| {
+        let field = Field::of(raw, motion, &self.carrier.rests, size).ok_or_else(|| {
             judge::undetermined("the field turns too little in its readings: bring each axis to point each way, and turn about all three")
         })?;
         judge::determines(&field)?;
@@ -282,11 +231,11 @@ impl<'a> Carrier<'a> {
             },
             lever_arm_mm: Err("a magnetometer reads the same everywhere on a body".to_string()),
             dip_deg: Some(dip),
-            rms: field.rms,
-            held_out_rms: field.held_out_rms,
-            noise_floor: field.noise_floor,
+            rms: field.errors.rms,
+            held_out_rms: field.errors.held_out_rms,
+            noise_floor: field.errors.noise_floor,
             window_s: field::TURN_S,
-            windows: field.turns,
+            windows: field.errors.windows,
             left_out: field.left_out,
         })
     }

@@ -103,11 +103,6 @@ impl Groups {
         }
     }
 
-    /// Scatter of a group, as a variance; `None` if it has too few residuals.
-    pub fn variance(&self, group: usize) -> Option<f64> {
-        self.variance[group]
-    }
-
     /// Whether the last residuals had the scatter of those before.
     pub fn are_settled(&self) -> bool {
         self.change < SETTLED

@@ -4,14 +4,17 @@
 //! the first accelerometer and the arm r to the second. Both are compared in integrals over windows, so that nothing is differentiated: of ω' there remains
 //! the difference of two rates, and of a delay τ the difference of two readings. Both are linear in C, o and r; τ is found by steps.
 
-use mimu::triad::{Part, affine};
+use mimu::triad::{Part, affine, vector};
 use mimu_core::compensation::Affine;
 use mimu_recording::TriadKind;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
+use crate::carrier::Reference;
 use crate::clustered::{Clusters, Solution};
+use crate::judge::Errors;
 use crate::pieces::{Groups, Pieces};
-use crate::series::{Motion, Series};
+use crate::series::Series;
+use crate::verify::Standing;
 
 /// Length of a window, s. Longer ones average out what a hand does in less; shorter ones cost time and gain nothing.
 pub(crate) const WINDOW_S: f64 = 0.2;
@@ -32,16 +35,6 @@ const LONGEST_STEP_S: f64 = 0.03;
 const DELAY: usize = 12;
 const ARM: usize = 13;
 
-/// What a further triad is compared with.
-pub(crate) struct Reference<'a> {
-    /// Motion by the first gyro; an accelerometer without one has no arm.
-    pub motion: Option<&'a Motion>,
-    /// Compensated readings of the first triad of its kind, SI.
-    pub series: &'a Series,
-    /// Variance of white noise of these, SI².
-    pub noise: f64,
-}
-
 /// The relation of a further triad to the first of its kind.
 pub(crate) struct Relation {
     /// C and o, raw to SI, in the frame of the reference.
@@ -54,11 +47,8 @@ pub(crate) struct Relation {
     pub arm_m: Vector3<f64>,
     /// Share of what was known beforehand that delay and arm (its worst direction) still have as their standard deviation.
     pub undetermined: [f64; 2],
-    /// Rms over windows, in sample and held out, of the mean reading, SI; the same by white noise.
-    pub rms: f64,
-    pub held_out_rms: f64,
-    pub noise_floor: f64,
-    pub windows: usize,
+    /// Errors of the mean reading of a window, SI.
+    pub errors: Errors,
     pub left_out: Vec<[f64; 2]>,
 }
 
@@ -104,6 +94,25 @@ impl Relation {
             used = next;
         }
         problem.relation(&at, &solution?, &used)
+    }
+
+    /// Errors of a triad that stands so. `None` if nothing of it can be compared.
+    pub fn errors(
+        kind: TriadKind,
+        raw: &Series,
+        reference: &Reference,
+        standing: &Standing,
+    ) -> Option<Errors> {
+        let problem = Problem::new(kind, raw, reference)?;
+        let mut at = DVector::zeros(problem.parameters);
+        let Affine { matrix, offset } = standing.calibration;
+        at.fixed_rows_mut::<12>(0)
+            .copy_from(&vector(&matrix, &offset));
+        at[DELAY] = standing.delay_s;
+        if problem.parameters > ARM {
+            at.fixed_rows_mut::<3>(ARM).copy_from(&standing.arm_m);
+        }
+        problem.errors(&at, &vec![true; problem.pieces.count])
     }
 
     /// The part of the covariance of C and o.
@@ -290,14 +299,8 @@ impl<'a> Problem<'a> {
 
     fn relation(&self, at: &DVector<f64>, solution: &Solution, used: &[bool]) -> Option<Relation> {
         let calibration = affine(&at.fixed_rows::<12>(0).into_owned());
-        // Noise of a mean of n samples, trapezoids: the ends count half.
-        let per_window = (WINDOW_S / self.raw.period).max(FEWEST as f64);
-        let own = self.raw.noise() * calibration.matrix.norm_squared() / 3.0;
-        let noise = (own + self.reference.noise) / per_window;
-        let windows = self.windows.iter().filter(|w| used[w.piece]);
-        let residuals = windows.filter_map(|w| Some(self.residual(w, at)?.0.norm_squared() / 3.0));
-        let residuals: Vec<f64> = residuals.collect();
-        let rms = (residuals.iter().sum::<f64>() / residuals.len() as f64).sqrt();
+        let mut errors = self.errors(at, used)?;
+        errors.held_out_rms *= solution.unseen(used);
         let share = |k: usize, prior: f64| solution.by_weights[(k, k)].sqrt() / prior;
         let arm = (ARM..self.parameters).map(|k| share(k, ARM_M));
         Some(Relation {
@@ -310,10 +313,7 @@ impl<'a> Problem<'a> {
                 false => Vector3::zeros(),
             },
             undetermined: [share(DELAY, DELAY_S), arm.fold(0.0, f64::max)],
-            rms,
-            held_out_rms: rms * solution.unseen(used),
-            noise_floor: noise.sqrt(),
-            windows: residuals.len(),
+            errors,
             left_out: self.pieces.spans(used),
         })
     }

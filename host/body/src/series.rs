@@ -11,53 +11,59 @@ pub(crate) struct Series {
     pub x: Vec<Vector3<f64>>,
     /// Usual time between samples, s.
     pub period: f64,
+    /// Whether nothing is known between a sample and the next: there is a gap, or a reading was saturated.
+    broken: Vec<bool>,
 }
 
 /// Times between samples beyond this many periods are gaps, across which nothing is integrated.
 const GAP: f64 = 2.5;
-/// Equal samples at the end of a channel's range that are called saturated.
-const AT_RAIL: usize = 3;
-
 impl Series {
     /// Of the samples whose three readings are numbers, in order of time.
     pub fn new(t: &[f64], axes: [&[f64]; 3]) -> Self {
         let clipped = Clipped::of(axes);
-        let mut series = Self::default();
+        let (mut all, mut saturated) = (Vec::new(), Vec::new());
+        let mut is_saturated = false;
         for (k, &at) in t.iter().enumerate() {
             let x = Vector3::new(axes[0][k], axes[1][k], axes[2][k]);
-            let later = series.t.last().is_none_or(|last| at > *last);
-            if later && x.iter().all(|v| v.is_finite()) && !clipped.contains(&x) {
-                series.t.push(at);
-                series.x.push(x);
+            if clipped.contains(&x) {
+                is_saturated = true;
+            } else if x.iter().all(|v| v.is_finite())
+                && all.last().is_none_or(|(last, _)| at > *last)
+            {
+                all.push((at, x));
+                saturated.push(std::mem::take(&mut is_saturated));
             }
         }
-        let gaps = series.t.windows(2).map(|w| w[1] - w[0]).collect();
-        series.period = mimu_recording::units::median(gaps).unwrap_or(f64::NAN);
-        series
+        Self::of(all, &saturated)
+    }
+
+    /// Of these samples; before some of them a reading was saturated.
+    fn of(all: Vec<(f64, Vector3<f64>)>, saturated: &[bool]) -> Self {
+        let (t, x): (Vec<f64>, Vec<_>) = all.into_iter().unzip();
+        let between = t.windows(2).map(|w| w[1] - w[0]);
+        let period = mimu_recording::units::median(between.clone().collect()).unwrap_or(f64::NAN);
+        let broken = between.zip(&saturated[1.min(saturated.len())..]);
+        Self {
+            broken: broken
+                .map(|(gap, clip)| *clip || gap > GAP * period)
+                .collect(),
+            period,
+            t,
+            x,
+        }
     }
 
     /// Without samples that repeat the one before: a slower triad whose last reading is written again.
-    pub fn without_repeats(mut self) -> Self {
-        let mut last = Vector3::repeat(f64::NAN);
-        let new: Vec<bool> = self
-            .x
-            .iter()
-            .map(|x| {
-                let is = *x != last;
-                last = *x;
-                is
-            })
-            .collect();
-        if new.iter().filter(|n| **n).count() * 10 > new.len() * 9 {
+    pub fn without_repeats(self) -> Self {
+        let is_new = |k: usize| k == 0 || self.x[k] != self.x[k - 1];
+        let new: Vec<usize> = (0..self.len()).filter(|k| is_new(*k)).collect();
+        if new.len() * 10 > self.len() * 9 {
             return self;
         }
-        let mut keep = new.iter();
-        self.t.retain(|_| *keep.next().unwrap_or(&true));
-        let mut keep = new.iter();
-        self.x.retain(|_| *keep.next().unwrap_or(&true));
-        let gaps = self.t.windows(2).map(|w| w[1] - w[0]).collect();
-        self.period = mimu_recording::units::median(gaps).unwrap_or(f64::NAN);
-        self
+        let all = new.iter().map(|k| (self.t[*k], self.x[*k])).collect();
+        let before = [0].iter().chain(&new).zip(&new);
+        let broken: Vec<bool> = before.map(|(a, b)| self.is_broken(*a, *b)).collect();
+        Self::of(all, &broken)
     }
 
     /// Each reading through `map`.
@@ -66,6 +72,7 @@ impl Series {
             t: self.t.clone(),
             x: self.x.iter().map(map).collect(),
             period: self.period,
+            broken: self.broken.clone(),
         }
     }
 
@@ -82,7 +89,7 @@ impl Series {
             return (self.t[at] == t && at > 0).then(|| (at - 1, 1.0));
         }
         let between = self.t[next] - self.t[at];
-        (between <= GAP * self.period).then(|| (at, (t - self.t[at]) / between))
+        (!self.broken[at]).then(|| (at, (t - self.t[at]) / between))
     }
 
     /// The reading at a time; `None` outside, or in a gap.
@@ -91,10 +98,9 @@ impl Series {
         Some(self.x[at].lerp(&self.x[at + 1], share))
     }
 
-    /// Whether there is a gap between two samples.
+    /// Whether there is a gap, or a saturated reading, between two samples.
     pub fn is_broken(&self, from: usize, to: usize) -> bool {
-        // Gaps are rare and windows short.
-        (from..to).any(|k| self.t[k + 1] - self.t[k] > GAP * self.period)
+        self.broken[from..to].contains(&true)
     }
 
     /// Variance of white noise of a reading, mean over the axes: that of third differences, by the quietest quarter of the pieces. What moves slowly against
@@ -124,13 +130,9 @@ impl Clipped {
                 finite().fold(f64::INFINITY, f64::min),
                 finite().fold(f64::NEG_INFINITY, f64::max),
             ];
-            ends.map(|end| {
-                let mut runs = values.windows(AT_RAIL);
-                let is_held = runs.any(|w| w.iter().all(|v| *v == end));
-                match is_held && is_full_scale(end) {
-                    true => end,
-                    false => f64::NAN,
-                }
+            ends.map(|end| match is_full_scale(end) {
+                true => end,
+                false => f64::NAN,
             })
         }))
     }
@@ -166,7 +168,7 @@ impl Motion {
         for k in 0..rate.len() {
             if k > 0 {
                 let between = rate.t[k] - rate.t[k - 1];
-                piece += u32::from(between > GAP * rate.period);
+                piece += u32::from(rate.is_broken(k - 1, k));
                 let mean = 0.5 * (rate.x[k] + rate.x[k - 1]);
                 now *= UnitQuaternion::from_scaled_axis(mean * between);
             }
@@ -214,8 +216,11 @@ mod tests {
     fn saturated_samples_are_left_out_and_an_extreme_that_was_reached_is_not() {
         let mut x: Vec<f64> = (0..100).map(|k| f64::from(k) * 10.0).collect();
         x.extend([32767.0; 5]);
-        let t: Vec<f64> = (0..105).map(f64::from).collect();
-        assert_eq!(Series::new(&t, [&x, &x, &x]).len(), 100);
+        let t: Vec<f64> = (0..106).map(f64::from).collect();
+        x.push(1000.0);
+        let series = Series::new(&t, [&x, &x, &x]);
+        assert_eq!(series.len(), 101);
+        assert!(series.is_broken(99, 100) && !series.is_broken(0, 99));
         x.truncate(100);
         assert_eq!(Series::new(&t[..100], [&x, &x, &x]).len(), 100);
     }

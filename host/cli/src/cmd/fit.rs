@@ -304,25 +304,10 @@ fn one(args: &FitArgs, recording: &Path) -> Result<Status> {
     match more {
         None => write(args, text, &result, &result.judgement, &place, made),
         Some(more) => {
-            let all = with_body(&result, &more);
+            let all = report::with_sensors(&result, &more);
             write(args, text, &all, &result.judgement, &place, made)
         }
     }
-}
-
-/// The result of a fit with the further triads among its sensors.
-fn with_body(result: &FitResult, more: &BodyResult) -> serde_json::Value {
-    let mut all = serde_json::json!(result);
-    let mut more = serde_json::json!(more);
-    if let (Some(sensors), Some(further)) = (
-        all["sensors"].as_object_mut(),
-        more["sensors"].as_object_mut(),
-    ) {
-        sensors.append(further);
-    }
-    all["body"] = more["body"].take();
-    all["refused"] = more["refused"].take();
-    all
 }
 
 /// One calibration of several sessions.

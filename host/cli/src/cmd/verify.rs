@@ -1,23 +1,26 @@
 //! `mimu verify`.
 
+use std::cell::RefCell;
 use std::path::PathBuf;
 
 use clap::Args;
 use mimu::calibration::Calibration;
 use mimu::calibration::verify::{Verification, verify};
 use mimu::data_sheet::DataSheet;
+use mimu::judgement::Judgement;
 use mimu::noise::noise_file::NoiseFile;
 use mimu::prepared::Prepared;
 use mimu::signal::stillness::DwellSearch;
 use mimu_recording::error::Result;
 use serde::Serialize;
+use serde_json::json;
 
 use crate::arguments::{
     JsonArgs, NoiseArgs, PartArgs, StillArgs, StrictArgs, VerboseArgs, WholeTurnArgs, with_noise,
 };
 use crate::hint::OF_A_LOG;
 use crate::output::print;
-use crate::reading::{LogArgs, read_samples_or_means};
+use crate::reading::{LogArgs, read_with_samples};
 use crate::report;
 use crate::report::data_sheet::{WithDataSheet, data_sheet_text};
 use crate::status::Status;
@@ -53,16 +56,29 @@ pub(crate) fn run(args: &VerifyArgs) -> Result<Status> {
     let outputs = [args.json.file()];
     let log = args.log.or_gravity(calibration.recording.gravity_mps2);
     let inputs = [Some(args.calibration.as_path()), args.noise.file.as_deref()];
-    let open = |search| read_samples_or_means(&args.recording, &log, search, &outputs, &inputs);
+    let samples = RefCell::new(None);
+    let open = |search| {
+        let read = read_with_samples(&args.recording, &log, search, &outputs, &inputs)?;
+        samples.replace(read.1);
+        Ok(read.0)
+    };
     let noise = args.noise.read()?;
     let made = args.judged(&open, noise.as_ref(), &calibration)?;
-    print(
-        &args.json,
-        &made.text(args.verbose.verbose),
-        &made.json(),
-        None,
-    )?;
-    Ok(args.strict.status(&made.result.judgement))
+    let further = samples
+        .take()
+        .map(|of| mimu_body::verify(&of, &calibration));
+    let further = further.transpose()?.unwrap_or_default();
+    let text = made.text(args.verbose.verbose);
+    if further.is_empty() {
+        print(&args.json, &text, &made.json(), None)?;
+    } else {
+        let text = text + &report::body_errors_text(&further);
+        let all = report::with_sensors(&made.json(), &json!({ "sensors": further }));
+        print(&args.json, &text, &all, None)?;
+    }
+    let judged = further.into_values().map(|of| of.judgement);
+    let all = Judgement::worst([made.result.judgement.clone()].into_iter().chain(judged));
+    Ok(args.strict.status(&all.unwrap_or(made.result.judgement)))
 }
 
 impl VerifyArgs {

@@ -1,7 +1,13 @@
 //! The further triads of a body.
 
+use std::collections::BTreeMap;
+
 use maud::{Markup, html};
-use mimu_body::result::{BodyResult, EstimateResult, PlaceResult, TriadResult};
+use mimu::judgement::JudgementKind;
+use mimu_body::TriadVerification;
+use mimu_body::result::{BodyResult, EstimateResult, PlaceResult};
+use serde::Serialize;
+use serde_json::{Value, json};
 
 use super::table::{by_axes, interval, number, table};
 use super::terminal::text;
@@ -11,13 +17,47 @@ pub(crate) fn body_text(body: &BodyResult) -> String {
     format!("\n{}", text(&section(body)))
 }
 
+/// The errors of the further triads in a verification as text.
+pub(crate) fn body_errors_text(found: &BTreeMap<String, TriadVerification>) -> String {
+    let rows = found
+        .iter()
+        .map(|(triad, of)| (triad, of.unit.as_str(), [of.rms, of.noise_floor]));
+    let heads = ["on this recording", "noise"];
+    format!(
+        "\n{}",
+        text(&html! {
+            h2 { "Body" }
+            (errors("Root mean square error; noise: what white noise alone would cause", heads, rows, |triad| found[triad].judgement.kind))
+            @for (triad, of) in found.iter().filter(|(_, of)| !of.judgement.is_good()) { p.line { (triad) " is judged " (of.judgement) } }
+        })
+    )
+}
+
+/// A result with the further triads among its sensors, as JSON.
+pub(crate) fn with_sensors(result: &impl Serialize, more: &impl Serialize) -> Value {
+    let [mut all, more] = [json!(result), json!(more)];
+    let further = more.as_object().into_iter().flatten();
+    for (key, value) in further {
+        match (all[key].as_object_mut(), value.as_object()) {
+            (Some(own), Some(value)) => own.extend(value.clone()),
+            _ => all[key] = value.clone(),
+        }
+    }
+    all
+}
+
 /// The section of a document.
 pub(super) fn section(body: &BodyResult) -> Markup {
     let places = &body.body;
     html! {
         h2 { "Body" }
         @if !places.is_empty() {
-            (errors(body))
+            (errors(
+                "Root mean square error; held out: in pieces of time that the fit has not used; noise: what white noise alone would cause",
+                ["held out", "in sample", "noise"],
+                body.sensors.iter().map(|(triad, of)| (triad, of.unit, [of.held_out_rms, of.rms, of.noise_floor])),
+                |triad| body.sensors[triad].judgement.kind,
+            ))
             (standing(places))
             (table("By how much its readings are later than those of its reference; angle of the field below the level", &html! {
                 th { "triad" } th { "against" } th.n { "delay, ms" } @if places.iter().any(|p| p.dip_deg.is_some()) { th.n { "dip, deg" } }
@@ -38,9 +78,14 @@ pub(super) fn section(body: &BodyResult) -> Markup {
     }
 }
 
-fn errors(body: &BodyResult) -> Markup {
-    let caption = "Root mean square error; held out: in pieces of time that the fit has not used; noise: what white noise alone would cause";
-    let factor = |result: &TriadResult| match result.unit {
+/// Errors of triads with their units, under `heads`.
+fn errors<'a, const N: usize>(
+    caption: &str,
+    heads: [&str; N],
+    rows: impl Iterator<Item = (&'a String, &'a str, [f64; N])>,
+    judged: impl Fn(&String) -> JudgementKind,
+) -> Markup {
+    let scale = |unit: &str| match unit {
         "rad/s" => ("deg/s", 1f64.to_degrees()),
         "m/s^2" => ("mm/s²", 1e3),
         "field" => ("1e-3 of the field", 1e3),
@@ -48,13 +93,10 @@ fn errors(body: &BodyResult) -> Markup {
     };
     table(
         caption,
-        &html! { th { "rms error" } th.n { "held out" } th.n { "in sample" } th.n { "noise" } th { "judged" } },
-        &html! { @for (triad, result) in &body.sensors {
-            @let (unit, factor) = factor(result);
-            tr {
-                td { (triad) ", " (unit) } (number(result.held_out_rms, factor)) (number(result.rms, factor)) (number(result.noise_floor, factor))
-                td { (result.judgement.kind) }
-            }
+        &html! { th { "rms error" } @for head in heads { th.n { (head) } } th { "judged" } },
+        &html! { @for (triad, unit, values) in rows {
+            @let (unit, factor) = scale(unit);
+            tr { td { (triad) ", " (unit) } @for value in values { (number(value, factor)) } td { (judged(triad)) } }
         } },
     )
 }

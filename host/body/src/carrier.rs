@@ -1,0 +1,124 @@
+//! The first gyro and accelerometer of a body, compensated: what its further triads are compared with.
+
+use mimu::fit::Fit;
+use mimu::quantity::{PerSensor, Sensor};
+use mimu_core::compensation::Affine;
+use mimu_recording::error::Result;
+use mimu_recording::{Column, Recording, TriadKind, TriadName};
+use nalgebra::Vector3;
+
+use crate::series::{Motion, Series};
+
+/// A rest: its times, s, and the direction up in the frame of the body.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Rest {
+    pub from_s: f64,
+    pub to_s: f64,
+    pub up: Vector3<f64>,
+}
+
+/// Compensated readings, and variances of their white noise, SI².
+pub(crate) struct Carrier {
+    motion: Option<(Motion, f64)>,
+    force: Option<(Series, f64)>,
+    /// Its rests.
+    pub rests: Vec<Rest>,
+}
+
+/// What a further gyro or accelerometer is compared with.
+pub(crate) struct Reference<'a> {
+    /// Motion by the first gyro; an accelerometer without one has no arm.
+    pub motion: Option<&'a Motion>,
+    /// Compensated readings of the first triad of its kind, SI.
+    pub series: &'a Series,
+    /// Variance of white noise of these, SI².
+    pub noise: f64,
+}
+
+impl Reference<'_> {
+    /// Rms of an axis, SI.
+    pub fn signal(&self) -> f64 {
+        let squares = self.series.x.iter().map(|x| x.norm_squared());
+        (squares.sum::<f64>() / self.series.len() as f64 / 3.0).sqrt()
+    }
+}
+
+/// The name of the first triad of `sensor`.
+pub(crate) fn first(sensor: Sensor) -> TriadName {
+    TriadName::first(match sensor {
+        Sensor::Gyro => TriadKind::Gyro,
+        Sensor::Accel => TriadKind::Accel,
+    })
+}
+
+/// Raw readings of a triad.
+pub(crate) fn read(recording: &Recording, name: TriadName) -> Result<Series> {
+    let columns = [0, 1, 2].map(|axis| Column::of(name, axis));
+    let columns = [Column::Time, columns[0], columns[1], columns[2]];
+    let all = recording.read_columns(&columns, |_| ())?;
+    Ok(Series::new(&all[0], [&all[1], &all[2], &all[3]]))
+}
+
+/// The rests that a fit has used.
+pub(crate) fn rests(fit: &Fit) -> Vec<Rest> {
+    let accel = fit.sensor(Sensor::Accel).into_iter();
+    let rests = accel.flat_map(|accel| {
+        let dwells = fit.prepared.dwells.list.iter();
+        let own = dwells.filter(|d| d.faults.accel.is_none() && !d.spins() && !d.turn);
+        own.filter_map(|d| {
+            let model = accel.estimated.triad.inverse;
+            let force = model.apply(&d.raw_mean(Sensor::Accel));
+            Some(Rest {
+                from_s: d.start_s,
+                to_s: d.start_s + d.duration_s,
+                up: force.try_normalize(1.0)?,
+            })
+        })
+    });
+    rests.collect()
+}
+
+impl Carrier {
+    /// Of the first triads, as far as they have models, raw to SI.
+    pub fn read(
+        recording: &Recording,
+        models: &PerSensor<Option<Affine<f64>>>,
+        rests: Vec<Rest>,
+    ) -> Result<Self> {
+        let there = recording.triads();
+        let series = |sensor: Sensor| -> Result<Option<(Series, f64)>> {
+            let model = models[sensor].filter(|_| there.contains(&first(sensor)));
+            let Some(model) = model else {
+                return Ok(None);
+            };
+            let raw = read(recording, first(sensor))?;
+            let noise = raw.noise() * model.matrix.norm_squared() / 3.0;
+            Ok(Some((raw.map(|u| model.apply(u)), noise)))
+        };
+        let motion = series(Sensor::Gyro)?;
+        Ok(Self {
+            motion: motion.map(|(rate, noise)| (Motion::new(rate), noise)),
+            force: series(Sensor::Accel)?,
+            rests,
+        })
+    }
+
+    /// Its motion by the gyro.
+    pub fn motion(&self) -> Option<&Motion> {
+        self.motion.as_ref().map(|(motion, _)| motion)
+    }
+
+    /// What a further triad of this kind is compared with.
+    pub fn reference(&self, sensor: Sensor) -> Option<Reference<'_>> {
+        let motion = self.motion.as_ref();
+        let (series, noise) = match sensor {
+            Sensor::Gyro => motion.map(|(motion, noise)| (&motion.rate, *noise))?,
+            Sensor::Accel => self.force.as_ref().map(|(force, noise)| (force, *noise))?,
+        };
+        Some(Reference {
+            motion: self.motion(),
+            series,
+            noise,
+        })
+    }
+}

@@ -1,0 +1,133 @@
+//! The further triads of a calibration file, judged by a recording that they were not made from.
+
+use std::collections::BTreeMap;
+
+use mimu::calibration::Calibration;
+use mimu::calibration::body::BodyTriad;
+use mimu::judgement::Judgement;
+use mimu::quantity::Sensor;
+use mimu_core::compensation::Affine;
+use mimu_recording::error::Result;
+use mimu_recording::{Recording, TriadKind};
+use nalgebra::{Matrix3, Rotation3, Vector3};
+use serde::Serialize;
+
+use crate::carrier::{Carrier, read};
+use crate::field::Field;
+use crate::judge;
+use crate::same_body::Relation;
+
+/// Errors of a further triad.
+#[derive(Debug, Clone, Serialize)]
+pub struct TriadVerification {
+    /// Rms error over windows, in [`Self::unit`].
+    pub rms: f64,
+    /// The same by white noise.
+    pub noise_floor: f64,
+    /// Unit of both.
+    pub unit: String,
+    /// Number of windows.
+    pub windows: usize,
+    /// Its judgement.
+    pub judgement: Judgement,
+}
+
+/// Where a triad stands, and its calibration in the frame of the reference.
+pub(crate) struct Standing {
+    /// C and o, in the frame of the reference.
+    pub calibration: Affine<f64>,
+    /// Delay, s, and arm, m; zero if they are not known.
+    pub delay_s: f64,
+    pub arm_m: Vector3<f64>,
+}
+
+impl From<&BodyTriad> for Standing {
+    fn from(of: &BodyTriad) -> Self {
+        let turned = of.rotation_deg.unwrap_or([0.0; 3]).map(f64::to_radians);
+        let rotation = Rotation3::new(Vector3::from(turned));
+        let own = Matrix3::from_fn(|i, j| of.C[i][j]);
+        Self {
+            calibration: Affine {
+                matrix: rotation * own,
+                offset: rotation * Vector3::from(of.o),
+            },
+            delay_s: of.delay_ms.unwrap_or(0.0) / 1e3,
+            arm_m: Vector3::from(of.lever_arm_mm.unwrap_or([0.0; 3])) / 1e3,
+        }
+    }
+}
+
+/// Errors of the further triads that both the file and the recording have, by name.
+///
+/// # Errors
+/// The samples cannot be read.
+pub fn verify(
+    recording: &Recording,
+    calibration: &Calibration,
+) -> Result<BTreeMap<String, TriadVerification>> {
+    let there = recording.triads();
+    let mut found = BTreeMap::new();
+    let own: Vec<&BodyTriad> = calibration
+        .body
+        .iter()
+        .filter(|of| there.contains(&of.triad))
+        .collect();
+    if own.is_empty() {
+        return Ok(found);
+    }
+    let models = mimu_core::PerSensor::from_fn(|sensor| calibration.inverse(sensor));
+    let carrier = Carrier::read(recording, &models, Vec::new())?;
+    for of in own {
+        let judged = one(&carrier, recording, of)?;
+        found.extend(judged.map(|judged| (of.triad.to_string(), judged)));
+    }
+    Ok(found)
+}
+
+/// `None` if the first triad of its kind is missing, or nothing moves.
+fn one(
+    carrier: &Carrier,
+    recording: &Recording,
+    of: &BodyTriad,
+) -> Result<Option<TriadVerification>> {
+    let raw = read(recording, of.triad)?;
+    let standing = Standing::from(of);
+    let (errors, judgement) = match of.triad.kind {
+        TriadKind::Mag => {
+            let Some(motion) = carrier.motion() else {
+                return Ok(None);
+            };
+            // Without `--field` its unit is the size of the field.
+            let size = match of.unit.as_str() {
+                "field" => Some(1.0),
+                _ => None,
+            };
+            let Some((errors, size)) = Field::errors(raw, motion, &standing, size) else {
+                return Ok(None);
+            };
+            let judgement = judge::field_again(&errors, size);
+            (errors, judgement)
+        }
+        kind => {
+            let sensor = match kind {
+                TriadKind::Gyro => Sensor::Gyro,
+                _ => Sensor::Accel,
+            };
+            let Some(reference) = carrier.reference(sensor) else {
+                return Ok(None);
+            };
+            let Some(errors) = Relation::errors(kind, &raw, &reference, &standing) else {
+                return Ok(None);
+            };
+            let judgement = judge::same_body(&errors, reference.signal(), sensor);
+            (errors, judgement)
+        }
+    };
+    Ok(Some(TriadVerification {
+        rms: errors.held_out_rms,
+        noise_floor: errors.noise_floor,
+        unit: of.unit.clone(),
+        windows: errors.windows,
+        judgement,
+    }))
+}
