@@ -1,11 +1,14 @@
 //! The first gyro and accelerometer of a body, compensated: what its further triads are compared with.
 
 use mimu::fit::Fit;
+use mimu::prepared::Prepared;
 use mimu::quantity::{PerSensor, Sensor};
+use mimu::signal::dwell::Dwell;
+use mimu::triad::{Covariance, Part, Triad};
 use mimu_core::compensation::Affine;
 use mimu_recording::error::Result;
 use mimu_recording::{Column, Recording, TriadKind, TriadName};
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, SVector, Vector3};
 
 use crate::series::{Motion, Series};
 
@@ -21,8 +24,6 @@ pub(crate) struct Rest {
 pub(crate) struct Carrier {
     motion: Option<(Motion, f64)>,
     force: Option<(Series, f64)>,
-    /// Its rests.
-    pub rests: Vec<Rest>,
 }
 
 /// What a further gyro or accelerometer is compared with.
@@ -59,32 +60,82 @@ pub(crate) fn read(recording: &Recording, name: TriadName) -> Result<Series> {
     Ok(Series::new(&all[0], [&all[1], &all[2], &all[3]]))
 }
 
-/// The rests that a fit has used.
-pub(crate) fn rests(fit: &Fit) -> Vec<Rest> {
-    let accel = fit.sensor(Sensor::Accel).into_iter();
-    let rests = accel.flat_map(|accel| {
-        let dwells = fit.prepared.dwells.list.iter();
+/// The first two triads of a unit: their calibrations, as far as there are any, and its rests.
+pub(crate) struct Unit {
+    /// Calibrations with their uncertainty.
+    pub triads: PerSensor<Option<Triad>>,
+    /// Its rests.
+    pub rests: Vec<Rest>,
+}
+
+/// How wrong a unit's readings in SI may be, standard deviations: of each element of C, and of o, rad/s and m/s². These are a percent, half a degree, and a bias at
+/// rest.
+const NOMINAL: f64 = 0.01;
+const NOMINAL_BIAS: PerSensor<f64> = PerSensor {
+    gyro: 0.001,
+    accel: 0.1,
+};
+
+impl Unit {
+    /// As a fit has calibrated it.
+    pub fn fitted(fit: &Fit) -> Self {
+        let triads = PerSensor::from_fn(|sensor| {
+            let found = fit.sensor(sensor)?;
+            Some(found.estimated.triad.clone())
+        });
+        Self::of(&fit.prepared, triads)
+    }
+
+    /// As it reads, in SI, less what the gyro reads at rest.
+    pub fn nominal(prepared: &Prepared) -> Self {
+        let triads = PerSensor::from_fn(|sensor| {
+            prepared.has(sensor).then_some(())?;
+            let mut at_rest = Vector3::zeros();
+            if sensor == Sensor::Gyro {
+                let means = prepared
+                    .dwells
+                    .list
+                    .iter()
+                    .filter(|d| !d.spins() && !d.turn);
+                let means: Vec<_> = means.map(|d| d.raw_mean(sensor)).collect();
+                let sum: Vector3<f64> = means.iter().sum();
+                at_rest = sum / means.len().max(1) as f64;
+            }
+            let variances = SVector::<f64, 12>::from_fn(|k, _| match k {
+                0..9 => NOMINAL.powi(2),
+                _ => NOMINAL_BIAS[sensor].powi(2),
+            });
+            let part = Part::known(Covariance::from_diagonal(&variances));
+            let inverse = Affine {
+                matrix: Matrix3::identity(),
+                offset: -at_rest,
+            };
+            Triad::from_inverse(inverse, vec![part])
+        });
+        Self::of(prepared, triads)
+    }
+
+    fn of(prepared: &Prepared, triads: PerSensor<Option<Triad>>) -> Self {
+        let dwells = prepared.dwells.list.iter();
         let own = dwells.filter(|d| d.faults.accel.is_none() && !d.spins() && !d.turn);
-        own.filter_map(|d| {
-            let model = accel.estimated.triad.inverse;
-            let force = model.apply(&d.raw_mean(Sensor::Accel));
+        let rest = |d: &Dwell| {
+            let model = triads.accel.as_ref()?.inverse;
             Some(Rest {
                 from_s: d.start_s,
                 to_s: d.start_s + d.duration_s,
-                up: force.try_normalize(1.0)?,
+                up: model.apply(&d.raw_mean(Sensor::Accel)).try_normalize(1.0)?,
             })
-        })
-    });
-    rests.collect()
+        };
+        Self {
+            rests: own.filter_map(rest).collect(),
+            triads,
+        }
+    }
 }
 
 impl Carrier {
     /// Of the first triads, as far as they have models, raw to SI.
-    pub fn read(
-        recording: &Recording,
-        models: &PerSensor<Option<Affine<f64>>>,
-        rests: Vec<Rest>,
-    ) -> Result<Self> {
+    pub fn read(recording: &Recording, models: &PerSensor<Option<Affine<f64>>>) -> Result<Self> {
         let there = recording.triads();
         let series = |sensor: Sensor| -> Result<Option<(Series, f64)>> {
             let model = models[sensor].filter(|_| there.contains(&first(sensor)));
@@ -99,7 +150,6 @@ impl Carrier {
         Ok(Self {
             motion: motion.map(|(rate, noise)| (Motion::new(rate), noise)),
             force: series(Sensor::Accel)?,
-            rests,
         })
     }
 

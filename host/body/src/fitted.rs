@@ -76,6 +76,12 @@ fn apart(of: &Affine<f64>) -> Option<(Affine<f64>, Rotation3<f64>)> {
     Some((own, Rotation3::from_matrix_unchecked(q)))
 }
 
+/// Rotation vector of a small rotation. By its trace an angle below 1e-8 would be zero.
+fn small_turn(of: &Rotation3<f64>) -> Vector3<f64> {
+    let m = of.matrix() - of.matrix().transpose();
+    0.5 * Vector3::new(m[(2, 1)], m[(0, 2)], m[(1, 0)])
+}
+
 /// Takes a calibration in the frame of the reference apart, with the parts of its covariance (C by rows, then o).
 pub(crate) fn placed(of: &Affine<f64>, parts: &[Part]) -> Option<Placed> {
     let (own, rotation) = apart(of)?;
@@ -94,8 +100,7 @@ pub(crate) fn placed(of: &Affine<f64>, parts: &[Part]) -> Option<Placed> {
         let (up, down) = (moved(step)?, moved(-step)?);
         let own = vector(&up.0.matrix, &up.0.offset) - vector(&down.0.matrix, &down.0.offset);
         by_own.set_column(k, &(own / (2.0 * step)));
-        let turned = (up.1 * down.1.inverse()).scaled_axis();
-        by_rotation.set_column(k, &(turned / (2.0 * step)));
+        by_rotation.set_column(k, &(small_turn(&(up.1 * down.1.inverse())) / (2.0 * step)));
     }
     let triad = Triad::from_inverse(own, parts.iter().map(|p| p.seen_by(&by_own)).collect())?;
     let angles = rotation.scaled_axis();
@@ -177,7 +182,16 @@ mod tests {
     #[test]
     fn the_error_of_a_rotation_is_that_of_the_calibration_it_is_in() {
         // One milliradian about z, in all of C.
-        let matrix = Matrix3::identity() * 0.5;
+        for (size, about) in [
+            (0.5, Vector3::zeros()),
+            (1e-3, Vector3::new(0.8, -0.3, 2.4)),
+        ] {
+            error_of_rotation(Rotation3::new(about), size);
+        }
+    }
+
+    fn error_of_rotation(rotation: Rotation3<f64>, size: f64) {
+        let matrix = rotation.matrix() * size;
         let turned = Vector3::z().cross_matrix() * matrix * 1e-3;
         let by = vector(&turned, &Vector3::zeros());
         let part = Part::known(by * by.transpose());

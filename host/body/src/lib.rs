@@ -17,7 +17,8 @@ mod verify;
 
 use mimu::fit::Fit;
 use mimu::judgement::Judgement;
-use mimu::quantity::Sensor;
+use mimu::prepared::Prepared;
+use mimu::quantity::{PerSensor, Sensor};
 use mimu::triad::{Estimate, half_width_95};
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{Recording, TriadKind, TriadName};
@@ -25,7 +26,7 @@ use mimu_recording::{Recording, TriadKind, TriadName};
 pub use fitted::{FittedTriad, Known};
 pub use verify::{TriadVerification, verify};
 
-use carrier::{Carrier, read, rests};
+use carrier::{Carrier, Unit, read};
 use field::Field;
 use same_body::Relation;
 use series::Series;
@@ -55,6 +56,26 @@ impl Body {
     /// # Errors
     /// The samples cannot be read; the size of the field is impossible.
     pub fn of(recording: &Recording, unit: &Fit, options: &Options) -> Result<Option<Self>> {
+        Self::fitted(recording, &Unit::fitted(unit), options)
+    }
+
+    /// As [`Self::of`], with a gyro and an accelerometer that are taken as they read: in SI, less what the gyro reads at rest. Their errors, of a percent and half a
+    /// degree, are in the intervals.
+    ///
+    /// # Errors
+    /// As of [`Self::of`].
+    pub fn of_readings(
+        recording: &Recording,
+        prepared: &Prepared,
+        options: &Options,
+    ) -> Result<Option<Self>> {
+        match prepared.is_in_si() {
+            true => Self::fitted(recording, &Unit::nominal(prepared), options),
+            false => Ok(None),
+        }
+    }
+
+    fn fitted(recording: &Recording, unit: &Unit, options: &Options) -> Result<Option<Self>> {
         if let Some(size) = options.field_ut
             && !(15.0..=75.0).contains(&size)
         {
@@ -68,12 +89,9 @@ impl Body {
         if more.is_empty() {
             return Ok(None);
         }
-        let models = mimu_core::PerSensor::from_fn(|sensor| {
-            unit.sensor(sensor)
-                .map(|found| found.estimated.triad.inverse)
-        });
+        let models = PerSensor::from_fn(|sensor| Some(unit.triads[sensor].as_ref()?.inverse));
         let fitting = Fitting {
-            carrier: Carrier::read(recording, &models, rests(unit))?,
+            carrier: Carrier::read(recording, &models)?,
             unit,
         };
         let mut body = Self {
@@ -81,19 +99,26 @@ impl Body {
             refused: Vec::new(),
         };
         for name in more {
-            let raw = read(recording, name)?;
-            match fitting.fitted(name, raw, options) {
+            match fitting.fitted(name, read(recording, name)?, options) {
                 Ok(triad) => body.triads.push(triad),
                 Err(why) => body.refused.push((name, why)),
             }
         }
         Ok(Some(body))
     }
+
+    /// The worst of its judgements.
+    pub fn judgement(&self) -> Judgement {
+        let of = self.triads.iter().map(|triad| triad.judgement.clone());
+        let refused = self.refused.iter().map(|(_, why)| why.clone());
+        Judgement::worst(of.chain(refused))
+            .unwrap_or_else(|| judge::undetermined("it has no further triad"))
+    }
 }
 
-/// The fit of the first two, and what it gives of them.
+/// The calibrations of the first two, and their readings.
 struct Fitting<'a> {
-    unit: &'a Fit,
+    unit: &'a Unit,
     carrier: Carrier,
 }
 
@@ -128,7 +153,7 @@ impl Fitting<'_> {
             _ => Sensor::Accel,
         };
         let reference = self.carrier.reference(sensor);
-        let Some((reference, unit)) = reference.zip(self.unit.sensor(sensor)) else {
+        let Some((reference, unit)) = reference.zip(self.unit.triads[sensor].as_ref()) else {
             return Err(judge::undetermined(format!(
                 "the first {sensor}, which it is compared with, is not calibrated"
             )));
@@ -139,7 +164,7 @@ impl Fitting<'_> {
                 Sensor::Accel => "its scale factors and angles are not determined: bring each axis up, down and in between",
             })
         })?;
-        let reference_parts = fitted::by_reference(&relation.calibration, &unit.estimated.triad);
+        let reference_parts = fitted::by_reference(&relation.calibration, unit);
         let parts = [vec![relation.part()], reference_parts].concat();
         let placed = fitted::placed(&relation.calibration, &parts)
             .ok_or_else(|| judge::undetermined("two of its axes read the same"))?;
@@ -188,18 +213,18 @@ impl Fitting<'_> {
         options: &Options,
     ) -> std::result::Result<FittedTriad, Judgement> {
         let motion = self.carrier.motion();
-        let Some((motion, gyro)) = motion.zip(self.unit.sensor(Sensor::Gyro)) else {
+        let Some((motion, gyro)) = motion.zip(self.unit.triads.gyro.as_ref()) else {
             return Err(judge::undetermined(
                 "the first gyro, whose turns it is compared with, is not calibrated",
             ));
         };
         let size = options.field_ut.unwrap_or(1.0);
         let raw = raw.without_repeats();
-        let field = Field::of(raw, motion, &self.carrier.rests, size).ok_or_else(|| {
+        let field = Field::of(raw, motion, &self.unit.rests, size).ok_or_else(|| {
             judge::undetermined("the field turns too little in its readings: bring each axis to point each way, and turn about all three")
         })?;
         judge::determines(&field)?;
-        let turned = fitted::turned_with(&field.calibration, &gyro.estimated.triad);
+        let turned = fitted::turned_with(&field.calibration, gyro);
         let parts = [vec![field.part()], turned].concat();
         let placed = fitted::placed(&field.calibration, &parts)
             .ok_or_else(|| judge::undetermined("two of its axes read the same"))?;

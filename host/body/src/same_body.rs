@@ -297,6 +297,19 @@ impl<'a> Problem<'a> {
         clusters
     }
 
+    /// Errors in sample at these parameters, over the pieces of time that are `used`. `None` without a window.
+    fn errors(&self, at: &DVector<f64>, used: &[bool]) -> Option<Errors> {
+        let calibration = affine(&at.fixed_rows::<12>(0).into_owned());
+        // Noise of a mean of n samples, trapezoids: the ends count half.
+        let per_window = (WINDOW_S / self.raw.period).max(FEWEST as f64);
+        let own = self.raw.noise() * calibration.matrix.norm_squared() / 3.0;
+        let noise = (own + self.reference.noise) / per_window;
+        let windows = self.windows.iter().filter(|w| used[w.piece]);
+        let squares = windows.filter_map(|w| Some(self.residual(w, at)?.0.norm_squared() / 3.0));
+        let squares: Vec<f64> = squares.collect();
+        Errors::of(&squares, noise)
+    }
+
     fn relation(&self, at: &DVector<f64>, solution: &Solution, used: &[bool]) -> Option<Relation> {
         let calibration = affine(&at.fixed_rows::<12>(0).into_owned());
         let mut errors = self.errors(at, used)?;

@@ -5,10 +5,10 @@ use std::collections::BTreeMap;
 use mimu::calibration::Calibration;
 use mimu::calibration::body::BodyTriad;
 use mimu::judgement::Judgement;
-use mimu::quantity::Sensor;
+use mimu::quantity::{PerSensor, Sensor};
 use mimu_core::compensation::Affine;
 use mimu_recording::error::Result;
-use mimu_recording::{Recording, TriadKind};
+use mimu_recording::{RawUnit, Recording, TriadKind};
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use serde::Serialize;
 
@@ -75,8 +75,13 @@ pub fn verify(
     if own.is_empty() {
         return Ok(found);
     }
-    let models = mimu_core::PerSensor::from_fn(|sensor| calibration.inverse(sensor));
-    let carrier = Carrier::read(recording, &models, Vec::new())?;
+    // What a file does not calibrate was taken as it reads.
+    let in_si = recording.manifest.raw_unit == RawUnit::Si;
+    let models = PerSensor::from_fn(|sensor| {
+        let as_it_reads = in_si.then(Affine::identity);
+        calibration.inverse(sensor).or(as_it_reads)
+    });
+    let carrier = Carrier::read(recording, &models)?;
     for of in own {
         let judged = one(&carrier, recording, of)?;
         found.extend(judged.map(|judged| (of.triad.to_string(), judged)));

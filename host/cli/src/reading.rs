@@ -107,18 +107,7 @@ pub(crate) fn remove_logs() {
     LOGS.lock().unwrap_or_else(PoisonError::into_inner).clear();
 }
 
-/// Reads a recording of samples or of means like [`read`].
-pub(crate) fn read_samples_or_means(
-    directory: &Path,
-    log: &LogArgs,
-    search: DwellSearch,
-    outputs: &[Option<&Path>],
-    others: &[Option<&Path>],
-) -> Result<Prepared> {
-    Ok(read_with_samples(directory, log, search, outputs, others)?.0)
-}
-
-/// As [`read_samples_or_means`], with the recording, if it is one of samples.
+/// Reads a recording of samples or of means like [`read`]; with the recording, if it is one of samples.
 pub(crate) fn read_with_samples(
     directory: &Path,
     log: &LogArgs,

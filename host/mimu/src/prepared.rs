@@ -481,7 +481,7 @@ impl Prepared {
     }
 
     /// Whether the readings are in SI.
-    pub(crate) fn is_in_si(&self) -> bool {
+    pub fn is_in_si(&self) -> bool {
         self.manifest.raw_unit == mimu_recording::RawUnit::Si
     }
 

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 /// Crates, as folders from the root of the repository.
 #[rustfmt::skip]
-const CRATES: [&str; 15] = [
+const CRATES: [&str; 16] = [
     "core", "firmware", "host/recording", "host/allan", "host/mimu", "host/thermal", "host/body", "host/device", "host/equipment", "host/export",
     "host/fleet", "host/wizard", "host/station", "host/cli", "rig", "rig/board",
 ];

@@ -148,6 +148,12 @@ impl FitArgs {
         }
     }
 
+    fn body(&self) -> BodyOptions {
+        BodyOptions {
+            field_ut: self.field,
+        }
+    }
+
     fn class(&self) -> PartClass {
         match self.class {
             None | Some(ClassArg::Consumer) => PartClass::Consumer,
@@ -263,22 +269,73 @@ fn fitted(
     prepared: Prepared,
     by: fn(Prepared, Options) -> Result<Fit>,
 ) -> Result<Fit> {
-    let found = DwellResult::list(&prepared);
-    let problems = OfRecording::prepared(&prepared);
-    by(prepared, args.options()).inspect_err(|_| {
-        refused(&problems, false);
-        eprint!("{}", report::dwell_table(&found));
-    })
+    let shown = Refused::of(&prepared);
+    by(prepared, args.options()).inspect_err(|_| shown.print())
+}
+
+/// What is shown of a recording that is refused.
+struct Refused(Vec<DwellResult>, Vec<OfRecording>);
+
+impl Refused {
+    fn of(prepared: &Prepared) -> Self {
+        Self(DwellResult::list(prepared), OfRecording::prepared(prepared))
+    }
+
+    fn print(&self) {
+        refused(&self.1, false);
+        eprint!("{}", report::dwell_table(&self.0));
+    }
+}
+
+/// The further triads of a recording whose gyro and accelerometer are not determined, for the reason `why`, and are taken as they read.
+///
+/// # Errors
+/// `why`, if there are none, or the readings are not in SI.
+fn body_alone(
+    args: &FitArgs,
+    samples: Option<&Recording>,
+    prepared: &Prepared,
+    why: Error,
+) -> Result<Status> {
+    let body = samples.map(|samples| Body::of_readings(samples, prepared, &args.body()));
+    let body = body.transpose()?.flatten();
+    let Some(body) = body.filter(|body| !body.triads.is_empty()) else {
+        Refused::of(prepared).print();
+        return Err(why);
+    };
+    let raw = prepared.manifest.raw_unit;
+    let (more, judgement) = (BodyResult::of(&body, raw), body.judgement());
+    let text = format!(
+        "{}: gyro and accelerometer are taken as they read: {why}\n{}",
+        prepared.place,
+        report::body_text(&more)
+    );
+    let head = serde_json::json!({
+        "format": "mimu-fit/1",
+        "device": prepared.manifest.device,
+        "judgement": judgement,
+        "not_calibrated": why.to_string(),
+        "raw_unit": raw,
+    });
+    let all = report::with_sensors(&head, &more);
+    let made = || Calibration::of_body(prepared, body.tables(raw), judgement.clone(), &now());
+    write(args, text, &all, &judgement, &prepared.place, made)
 }
 
 fn one(args: &FitArgs, recording: &Path) -> Result<Status> {
     let (prepared, samples) = prepared(args, recording)?;
     let place = prepared.place.clone();
-    let fitted = fitted(args, prepared, fit_or_faces)?;
-    let options = BodyOptions {
-        field_ut: args.field,
+    let fitted = match fit_or_faces(prepared.clone(), args.options()) {
+        Ok(fitted) => fitted,
+        Err(why @ Error::Undetermined(_)) => {
+            return body_alone(args, samples.as_ref(), &prepared, why);
+        }
+        Err(why) => {
+            Refused::of(&prepared).print();
+            return Err(why);
+        }
     };
-    let body = samples.map(|samples| Body::of(&samples, &fitted, &options));
+    let body = samples.map(|samples| Body::of(&samples, &fitted, &args.body()));
     let body = body.transpose()?.flatten();
     let result = FitResult::of(&fitted);
     let mut text = report::fit_text(&result, args.verbose.verbose);

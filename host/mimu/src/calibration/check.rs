@@ -86,7 +86,7 @@ impl Calibration {
                 "write 24 hexadecimal digits, as `mimu device info` gives them, or leave the key out",
             ));
         }
-        if self.gyro.is_none() && self.accel.is_none() {
+        if self.gyro.is_none() && self.accel.is_none() && self.body.is_empty() {
             return Err(Error::new(
                 place,
                 "the file has neither [gyro] nor [accel]",

@@ -3,6 +3,7 @@
 use mimu_core::table::is_temperature;
 use nalgebra::{Matrix3, Vector3};
 
+use super::body::BodyTriad;
 use super::{
     Calibration, FORMAT, FORMULA, ForwardTable, INVERSE_DIRECTION, Judged, Origin, PhysicalTable,
     TriadTable,
@@ -10,6 +11,7 @@ use super::{
 use crate::effects::fitted::FittedEffect;
 use crate::fit::{Fit, SensorFit};
 use crate::judgement::Judgement;
+use crate::prepared::Prepared;
 use crate::quantity::{Sensor, inverse_names, rounded};
 use crate::triad::{Angles, Covariance, Estimate, Forward, Physical, Triad};
 use mimu_recording::error::Result;
@@ -26,17 +28,46 @@ impl Calibration {
     /// # Errors
     /// An effect that cannot be removed, as when its sensor is not calibrated.
     pub fn of(fit: &Fit, effects: &[FittedEffect], created: &str) -> Result<Self> {
-        let manifest = &fit.prepared.manifest;
-        let dwells = fit.prepared.dwells.list.iter();
-        let temperatures = dwells.map(|d| d.temp_c).filter(|t| is_temperature(*t));
-        let temperatures: Vec<f64> = temperatures.collect();
-        let mean = temperatures.iter().sum::<f64>() / temperatures.len() as f64;
         // Their standard deviations have as many digits as those of the triads.
         let lasting = effects
             .iter()
             .map(|e| e.lasting().with_digits(SIGMA_DIGITS));
         let triad = |sensor| fit.sensor(sensor).map(|found| table(fit, found));
         let calibration = Self {
+            gyro: triad(Sensor::Gyro),
+            accel: triad(Sensor::Accel),
+            effects: lasting.collect(),
+            ..Self::without_triads(&fit.prepared, Judgement::of_fit(fit), created)
+        };
+        let place = format!("calibration of {:?}", calibration.device);
+        calibration.checked(&place)
+    }
+
+    /// The calibration of further triads alone, beside a gyro and an accelerometer that are taken as they read.
+    ///
+    /// # Errors
+    /// There is none.
+    pub fn of_body(
+        prepared: &Prepared,
+        body: Vec<BodyTriad>,
+        judgement: Judgement,
+        created: &str,
+    ) -> Result<Self> {
+        let calibration = Self {
+            body,
+            ..Self::without_triads(prepared, judgement, created)
+        };
+        let place = format!("calibration of {:?}", calibration.device);
+        calibration.checked(&place)
+    }
+
+    fn without_triads(prepared: &Prepared, judgement: Judgement, created: &str) -> Self {
+        let manifest = &prepared.manifest;
+        let dwells = prepared.dwells.list.iter();
+        let temperatures = dwells.map(|d| d.temp_c).filter(|t| is_temperature(*t));
+        let temperatures: Vec<f64> = temperatures.collect();
+        let mean = temperatures.iter().sum::<f64>() / temperatures.len() as f64;
+        Self {
             format: FORMAT.into(),
             device: manifest.device.clone(),
             unit_id: manifest.unit_id().map(str::to_owned),
@@ -45,11 +76,11 @@ impl Calibration {
             between_sessions: None,
             sessions: Vec::new(),
             tool: concat!("mimu ", env!("CARGO_PKG_VERSION")).into(),
-            judgement: Some(Judgement::of_fit(fit)),
+            judgement: Some(judgement),
             sensors: manifest.sensors().cloned(),
             recording: Origin {
                 // A recording in memory has none.
-                sha256: Some(fit.prepared.condensed.sha256.clone()).filter(|sha| !sha.is_empty()),
+                sha256: Some(prepared.condensed.sha256.clone()).filter(|sha| !sha.is_empty()),
                 reference: Some(manifest.reference),
                 raw_unit: manifest.raw_unit,
                 gravity_mps2: Some(manifest.gravity_mps2),
@@ -57,13 +88,12 @@ impl Calibration {
                 temp_c: mean.is_finite().then_some(mean),
                 temp_range_c: range(&temperatures),
             },
-            gyro: triad(Sensor::Gyro),
-            accel: triad(Sensor::Accel),
+            gyro: None,
+            accel: None,
             temperature: None,
-            effects: lasting.collect(),
+            effects: Vec::new(),
             body: Vec::new(),
-        };
-        calibration.checked(&format!("calibration of {:?}", manifest.device))
+        }
     }
 }
 
