@@ -174,7 +174,7 @@ mod tests {
         let offset = Vector3::new(0.3, -0.2, 0.1);
         let found = placed(&Affine { matrix, offset }, &[]).unwrap();
         assert!((found.triad.forward.matrix - own).norm() < 1e-12);
-        assert!(found.rotation.angle_to(&rotation) < 1e-12);
+        assert!((found.rotation.matrix() - rotation.matrix()).norm() < 1e-12);
         let x = rotation * found.triad.inverse.apply(&Vector3::new(1.0, 2.0, 3.0));
         assert!((x - (matrix * Vector3::new(1.0, 2.0, 3.0) + offset)).norm() < 1e-12);
     }
@@ -192,7 +192,8 @@ mod tests {
 
     fn error_of_rotation(rotation: Rotation3<f64>, size: f64) {
         let matrix = rotation.matrix() * size;
-        let turned = Vector3::z().cross_matrix() * matrix * 1e-3;
+        let about_z: Vector3<f64> = Vector3::z();
+        let turned: Matrix3<f64> = about_z.cross_matrix() * matrix * 1e-3;
         let by = vector(&turned, &Vector3::zeros());
         let part = Part::known(by * by.transpose());
         let offset = Vector3::zeros();

@@ -1,4 +1,4 @@
-//! Readings of a triad over time, between which a straight line is taken.
+//! Readings of a triad over time, and between its samples.
 
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -92,10 +92,22 @@ impl Series {
         (!self.broken[at]).then(|| (at, (t - self.t[at]) / between))
     }
 
-    /// The reading at a time; `None` outside, or in a gap.
+    /// The reading at a time, by the cubic through four samples; `None` outside, or in a gap.
+    ///
+    /// A straight line between two would make a motion of 1 Hz smaller by up to 0.05 % at 100 Hz, and with it the scale factor of what is compared with it.
     pub fn at(&self, t: f64) -> Option<Vector3<f64>> {
         let (at, share) = self.before(t)?;
-        Some(self.x[at].lerp(&self.x[at + 1], share))
+        let four = at.checked_sub(1).filter(|first| first + 3 < self.len());
+        let Some(first) = four.filter(|first| !self.is_broken(*first, first + 3)) else {
+            return Some(self.x[at].lerp(&self.x[at + 1], share));
+        };
+        let mut sum = Vector3::zeros();
+        for k in first..first + 4 {
+            let others = (first..first + 4).filter(|other| *other != k);
+            let weight = others.map(|o| (t - self.t[o]) / (self.t[k] - self.t[o]));
+            sum += weight.product::<f64>() * self.x[k];
+        }
+        Some(sum)
     }
 
     /// Whether there is a gap, or a saturated reading, between two samples.
@@ -198,11 +210,25 @@ impl Motion {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
 
+    /// A number between 0 and 1 that depends on `k` as if by chance (Steele, Lea, Flood: SplitMix).
+    fn uniform(k: usize) -> f64 {
+        let mut z = (k as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    /// The same with a normal distribution.
+    pub(crate) fn normal(k: usize) -> f64 {
+        let [size, angle] = [2 * k, 2 * k + 1].map(uniform);
+        (-2.0 * (1.0 - size).ln()).sqrt() * (std::f64::consts::TAU * angle).cos()
+    }
+
     #[test]
-    fn a_line_is_read_between_samples_and_nothing_across_a_gap() {
+    fn a_curve_is_read_between_samples_and_nothing_across_a_gap() {
         let t = [0.0, 1.0, 2.0, 7.0, 8.0];
         let x = [0.0, 1.0, 2.0, 7.0, f64::NAN];
         let series = Series::new(&t, [&x, &x, &x]);
@@ -210,6 +236,10 @@ mod tests {
         assert_eq!(series.at(3.0), None);
         assert_eq!(series.at(7.5), None);
         assert!(series.is_broken(1, 3) && !series.is_broken(0, 2));
+        let t: Vec<f64> = (0..100).map(|k| 0.01 * f64::from(k)).collect();
+        let x: Vec<f64> = t.iter().map(|t| (6.0 * t).sin()).collect();
+        let read = Series::new(&t, [&x, &x, &x]).at(0.255).unwrap();
+        assert!((read.x - 1.53f64.sin()).abs() < 1e-6, "{read}");
     }
 
     #[test]
@@ -238,13 +268,12 @@ mod tests {
 
     #[test]
     fn noise_is_found_beside_a_slow_motion() {
-        let noise = |k: usize| 0.1 * ((k as f64 * 12.9898).sin() * 43758.5453).fract();
+        let noise = |k: usize| 0.1 * normal(k);
         let t: Vec<f64> = (0..4000).map(|k| 0.01 * k as f64).collect();
         let x: Vec<f64> = (0..4000)
             .map(|k| (0.01 * k as f64).sin() + noise(k))
             .collect();
         let found = Series::new(&t, [&x, &x, &x]).noise();
-        // Uniform within ± 0.1: a variance of 0.1² / 3.
-        assert!((found / (0.01 / 3.0) - 1.0).abs() < 0.25, "{found}");
+        assert!((found / 0.01 - 1.0).abs() < 0.25, "{found}");
     }
 }
