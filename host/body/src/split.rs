@@ -1,0 +1,314 @@
+//! What turns err by, split into the part that all pairs of a body share and the part of each.
+//!
+//! After a turn each gyro predicts the direction of gravity, and errs. Errors of a sensor differ from pair to pair of one carrier; errors by the motion, its sampling or
+//! its dwells are the same for all. With `r_i` the error of pair i in the frame of the reference, c the common part and independent parts `e_i`,
+//!
+//! ```text
+//! r_i = c + e_i,   E[r_i·r_k] = E[|c|²],   E[|r_i - r_k|²] = E[|e_i|²] + E[|e_k|²]
+//! ```
+//!
+//! The second equation gives the common part, the third the part of each pair: the N-cornered hat (J. E. Gray and D. W. Allan, 1974). The errors are residuals of fits,
+//! and so are all figures here: those of turns that no fit has seen are larger.
+
+mod of_fits;
+
+use std::collections::BTreeMap;
+
+use mimu::effects::temperature::rank_correlation;
+use mimu::unseen::FALSE_ALARM;
+use nalgebra::{DMatrix, Matrix3, Vector3};
+use serde::Serialize;
+use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, StudentsT};
+
+pub use of_fits::turn_errors;
+
+/// Fewest turns that two pairs have to share.
+const FEWEST: usize = 6;
+
+/// The errors of one pair after all turns of the reference.
+#[derive(Debug, Clone)]
+pub struct PairErrors {
+    /// Number of the pair: `gyroN` with `accelN`.
+    pub pair: u8,
+    /// Error of the direction of gravity after each turn, a rotation vector across gravity in the frame of the reference, rad; not a number where the pair lacks the turn.
+    pub errors: Vec<Vector3<f64>>,
+    /// Their covariances by the noise of the pair, rad².
+    pub noise: Vec<Matrix3<f64>>,
+    /// Share of the degrees of freedom that its fit has left to these errors: 1 if they were unseen.
+    pub left: f64,
+}
+
+/// The errors of all pairs after the turns of a recording.
+#[derive(Debug, Clone)]
+pub struct TurnErrors {
+    /// The pairs, the reference first.
+    pub pairs: Vec<PairErrors>,
+    /// What each turn was like, in the order of [`COVARIATES`]: angle of rotation (rad), largest rate (rad/s), roughness (rad/s), instant (s). Roughness is the root of
+    /// the sum of squared second differences of the rate between neighbouring increments, of a sample or 10 ms, whichever is longer.
+    pub conditions: Vec<[f64; 4]>,
+    /// Mean square of each turn's error by what is known to be common, rad²: the Earth's rate about an unknown heading.
+    pub shared: Vec<f64>,
+}
+
+/// A part of the errors.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Part {
+    /// Rms, noise included, rad.
+    pub rms: f64,
+    /// Lower bound of its 95 % interval, rad.
+    pub lower: f64,
+    /// Upper bound.
+    pub upper: f64,
+    /// The same by noise alone: that of the pair, or what is known to be common.
+    pub noise_floor: f64,
+}
+
+/// What the size of the common part may correlate with, and the error of a whole carrier that shows so.
+pub const COVARIATES: [(&str, &str); 4] = [
+    ("angle", "clock error"),
+    ("rate", "bandwidth of the sampled rate"),
+    ("roughness", "aliasing and coning between samples"),
+    ("time", "drift"),
+];
+
+/// A rank correlation of the size of the common part.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Correlation {
+    /// With what, and the error that shows so: of [`COVARIATES`].
+    pub covariate: &'static str,
+    /// See `covariate`.
+    pub term: &'static str,
+    /// Spearman's coefficient.
+    pub coefficient: f64,
+    /// Probability of one as large by chance, two-sided, for this covariate alone.
+    pub p: f64,
+    /// Whether chance does not explain it, all covariates together: [`FALSE_ALARM`].
+    pub is_significant: bool,
+}
+
+/// The errors of turns, split.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Split {
+    /// Number of turns that at least two pairs have.
+    pub turns: usize,
+    /// The part that all pairs share.
+    pub common: Part,
+    /// The part of each pair, by its number.
+    pub own: BTreeMap<u8, Part>,
+    /// Probability that the pairs agree as well without a common part beyond what is known.
+    pub p: f64,
+    /// Whether there is one: the share of bodies without one that show one is [`FALSE_ALARM`].
+    pub exceeds_noise: bool,
+    /// What the common part correlates with; empty if it does not exceed the noise.
+    pub correlations: Vec<Correlation>,
+}
+
+/// Products of the errors of each two pairs, over the turns that both have.
+struct Products {
+    /// Means of `r_i·r_k`, rad².
+    product: DMatrix<f64>,
+    /// Means of `|r_i - r_k|²`, rad².
+    difference: DMatrix<f64>,
+    /// Degrees of freedom of `r_i·r_k`: the fewer, the more of both sizes is in a few turns.
+    dof: DMatrix<f64>,
+    pairs: usize,
+}
+
+impl Products {
+    fn of(pairs: &[PairErrors]) -> Option<Self> {
+        let zeros = DMatrix::zeros(pairs.len(), pairs.len());
+        let [mut product, mut difference, mut dof] = [zeros.clone(), zeros.clone(), zeros];
+        for (i, k) in (0..pairs.len()).flat_map(|i| (0..pairs.len()).map(move |k| (i, k))) {
+            let both = pairs[i].errors.iter().zip(&pairs[k].errors);
+            let both: Vec<_> = both.filter(|(a, b)| is_known(a) && is_known(b)).collect();
+            let n = both.len() as f64;
+            let mean = |of: &dyn Fn(&Vector3<f64>, &Vector3<f64>) -> f64| -> f64 {
+                both.iter().map(|(a, b)| of(a, b)).sum::<f64>() / n
+            };
+            let sizes = mean(&|a, _| a.norm_squared()) * mean(&|_, b| b.norm_squared());
+            if both.len() < FEWEST || !(sizes > 0.0) {
+                return None;
+            }
+            product[(i, k)] = mean(&|a, b| a.dot(b));
+            difference[(i, k)] = mean(&|a, b| (a - b).norm_squared());
+            // Vectors of these sizes and any direction in a plane: the mean of (a·b)² is |a|²|b|²/2.
+            let left = (pairs[i].left * pairs[k].left).sqrt();
+            let unequal = mean(&|a, b| a.norm_squared() * b.norm_squared());
+            dof[(i, k)] = 2.0 * left * n * sizes / unequal;
+        }
+        let pairs = pairs.len();
+        Some(Self {
+            product,
+            difference,
+            dof,
+            pairs,
+        })
+    }
+
+    /// Mean over each two pairs, weighted by the product of their weights.
+    fn mean(&self, weights: &[f64], of: impl Fn((usize, usize)) -> f64) -> f64 {
+        let each = (0..self.pairs).flat_map(|i| (0..i).map(move |k| (i, k)));
+        let (sum, weight) = each.fold((0.0, 0.0), |(sum, weight), (i, k)| {
+            let both = weights[i] * weights[k];
+            (sum + both * of((i, k)), weight + both)
+        });
+        sum / weight
+    }
+
+    /// Sum of the mean squares of the own parts.
+    fn all_own(&self) -> f64 {
+        0.5 * self.difference.sum() / (self.pairs as f64 - 1.0)
+    }
+
+    /// Mean square of the own part of each. The difference of only two is divided by what each has in common with the other.
+    fn own(&self) -> Vec<f64> {
+        let of = |i: usize| match self.pairs {
+            2 => self.product[(i, i)] - self.product[(0, 1)],
+            n => (self.difference.row(i).sum() - self.all_own()) / (n as f64 - 2.0),
+        };
+        (0..self.pairs).map(of).collect()
+    }
+
+    /// Probability of the agreement without a common part other than the mean square `known`.
+    fn chance(&self, known: f64) -> f64 {
+        let (equal, n) = (vec![1.0; self.pairs], self.pairs as f64);
+        let others = n - 1.0;
+        let sf = |ratio: f64, dof: f64, of: f64| {
+            FisherSnedecor::new(dof, of).map_or(1.0, |f| f.sf(ratio.max(0.0)))
+        };
+        // The sum of n unit vectors of any direction has mean and variance of a ratio of chi-squares with 2/n fewer degrees of freedom. Whatever the sizes of the errors.
+        let dof = self.mean(&equal, |at| self.dof[at]) - 2.0 / n;
+        let size = |i: usize| self.product[(i, i)];
+        let both = |(i, k)| (size(i) * size(k)).sqrt();
+        let cosine = self.mean(&equal, |at| self.product[at] / both(at));
+        let ratio = (1.0 + others * cosine) / (1.0 - cosine).max(1e-12);
+        let none = sf(ratio, dof, others * dof);
+        if known <= 0.0 {
+            return none;
+        }
+        // Beyond what is known: the square of the mean of all, by Satterthwaite's degrees of freedom.
+        let own = self.own().into_iter().map(|own| own.max(0.0));
+        let [sum, squares] = own.fold([0.0; 2], |[a, b], own| [a + own, b + own * own]);
+        let in_mean = self.all_own() / (n * n);
+        let found = self.mean(&equal, |at| self.product[at]) + in_mean;
+        let expected = known + in_mean;
+        let of = (sum * sum / squares) * others / n * dof * (expected / in_mean).powi(2);
+        none.max(sf(found / expected, dof, of))
+    }
+}
+
+/// Splits the errors. `None` for fewer than two pairs, or if two of them share fewer than six turns.
+pub fn split(of: &TurnErrors) -> Option<Split> {
+    let count = of.pairs.len();
+    let products = (count > 1).then(|| Products::of(&of.pairs))??;
+    let own = products.own();
+    let noise: Vec<f64> = of.pairs.iter().map(PairErrors::noise_square).collect();
+    // No pair errs by less than its noise.
+    let least = |i: usize| noise[i].max(1e-4 * products.product[(i, i)]);
+    let weights: Vec<f64> = (0..count).map(|i| own[i].max(least(i)).recip()).collect();
+    let in_mean = weights.iter().sum::<f64>().recip();
+    let common = products.mean(&weights, |at| products.product[at]);
+    let dof = products.mean(&weights, |at| products.dof[at]);
+    let others = (count - 1) as f64 * dof;
+    let left = of.pairs.iter().map(|pair| pair.left).sum::<f64>() / count as f64;
+    let known = left * of.shared.iter().sum::<f64>() / of.shared.len() as f64;
+    let part = |i: usize| {
+        // In the difference between this pair and the mean of the others, or what both of two share.
+        let beside = match count {
+            2 => common.max(0.0),
+            n => (products.all_own() - own[i]).max(0.0) / ((n - 1) as f64).powi(2),
+        };
+        let dof = 2.0 * of.pairs[i].left * of.pairs[i].known().count() as f64;
+        let part = Part::of([own[i] + beside, beside], [dof, others], noise[i]);
+        (of.pairs[i].pair, part)
+    };
+    let p = products.chance(known);
+    let means = of.means(&weights);
+    Some(Split {
+        turns: means.iter().filter(|mean| is_known(mean)).count(),
+        common: Part::of([common + in_mean, in_mean], [dof, others], known),
+        own: (0..count).map(part).collect(),
+        p,
+        exceeds_noise: p < FALSE_ALARM,
+        correlations: (0..COVARIATES.len())
+            .filter(|_| p < FALSE_ALARM)
+            .filter_map(|number| of.correlation(&means, number))
+            .collect(),
+    })
+}
+
+impl Part {
+    /// The difference of two mean squares with their degrees of freedom; its interval is by the method of variance estimates recovery (G. Y. Zou and A. Donner, 2008).
+    fn of(squares: [f64; 2], dof: [f64; 2], floor: f64) -> Self {
+        let bound = |k: usize, p: f64| {
+            let dof = dof[k].max(1.0);
+            let chi = ChiSquared::new(dof).map_or(f64::NAN, |d| d.inverse_cdf(p));
+            squares[k] * dof / chi
+        };
+        let difference = squares[0] - squares[1];
+        let below = (squares[0] - bound(0, 0.975)).hypot(bound(1, 0.025) - squares[1]);
+        let above = (bound(0, 0.025) - squares[0]).hypot(squares[1] - bound(1, 0.975));
+        let root = |square: f64| square.max(0.0).sqrt();
+        Self {
+            rms: root(difference),
+            lower: root(difference - below),
+            upper: root(difference + above),
+            noise_floor: root(floor),
+        }
+    }
+}
+
+impl PairErrors {
+    fn known(&self) -> impl Iterator<Item = usize> {
+        (0..self.errors.len()).filter(|j| is_known(&self.errors[*j]))
+    }
+
+    /// Mean square of the errors by noise.
+    fn noise_square(&self) -> f64 {
+        let sum: f64 = self.known().map(|j| self.noise[j].trace()).sum();
+        self.left * sum / self.known().count().max(1) as f64
+    }
+}
+
+impl TurnErrors {
+    /// Weighted mean of each turn's errors; not a number unless two pairs have it.
+    fn means(&self, weights: &[f64]) -> Vec<Vector3<f64>> {
+        let mean = |j: usize| {
+            let own = self.pairs.iter().zip(weights);
+            let own = own.filter(|(pair, _)| is_known(&pair.errors[j]));
+            let [weight, count] = own.clone().fold([0.0; 2], |[w, n], of| [w + of.1, n + 1.0]);
+            let sum: Vector3<f64> = own.map(|(pair, of)| pair.errors[j] * *of).sum();
+            sum / if count > 1.0 { weight } else { f64::NAN }
+        };
+        (0..self.conditions.len()).map(mean).collect()
+    }
+
+    fn correlation(&self, means: &[Vector3<f64>], number: usize) -> Option<Correlation> {
+        let known = self
+            .conditions
+            .iter()
+            .zip(means)
+            .filter(|of| is_known(of.1));
+        let mut sizes: Vec<_> = known.map(|(at, mean)| (at[number], mean.norm())).collect();
+        sizes.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let (covariate, term) = COVARIATES[number];
+        let coefficient = rank_correlation(&sizes)?;
+        let dof = sizes.len() as f64 - 2.0;
+        let t = coefficient * (dof / (1.0 - coefficient * coefficient).max(1e-12)).sqrt();
+        let p = 2.0 * StudentsT::new(0.0, 1.0, dof).ok()?.sf(t.abs());
+        Some(Correlation {
+            covariate,
+            term,
+            coefficient,
+            p,
+            is_significant: p < FALSE_ALARM / COVARIATES.len() as f64,
+        })
+    }
+}
+
+fn is_known(error: &Vector3<f64>) -> bool {
+    error.iter().all(|x| x.is_finite())
+}
+
+#[cfg(test)]
+mod tests;
