@@ -219,7 +219,11 @@ impl ForeignFile {
                 values.iter().map(|cell| cell.column),
                 how.log.trust_readings,
             ),
-            further: values.iter().copied().filter(|cell| is_further(cell)).count(),
+            further: values
+                .iter()
+                .copied()
+                .filter(|cell| is_further(cell))
+                .count(),
             values,
             empty_zero_temperatures: how.empty_zero_temperatures,
             skip_empty: how.skip_empty,

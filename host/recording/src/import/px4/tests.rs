@@ -231,6 +231,7 @@ fn two_devices() -> Written {
     let mut log = Written::new()
         .format(&format!("sensor_gyro:{SENSOR}"))
         .format(&format!("sensor_accel:{SENSOR}"))
+        .format(&format!("sensor_mag:{SENSOR}"))
         .subscribe(0, 0, "sensor_gyro")
         .subscribe(0, 1, "sensor_accel")
         .subscribe(2, 2, "sensor_accel");
@@ -285,7 +286,6 @@ fn an_instance_is_asked_for_where_there_are_several_and_the_instances_are_listed
 #[test]
 fn all_instances_are_pairs_with_numbers_and_magnetometers_are_in_microtesla() {
     let mut log = two_devices()
-        .format(&format!("sensor_mag:{SENSOR}"))
         .subscribe(0, 3, "sensor_mag")
         .subscribe(1, 4, "sensor_mag");
     for i in 0..10_u16 {
