@@ -357,7 +357,7 @@ fn the_calibrated_magnetometer_of_the_default_profile_is_read_in_place_of_a_spar
     for i in 0..20_u64 {
         let stamp = 5_000 + 200_000 * i;
         log = log.sensor(0, stamp, 77, [1.0, 2.0, 3.0]);
-        if i % 5 == 0 {
+        if i.is_multiple_of(5) {
             log = log.sensor(1, stamp, 78, [0.5, 0.5, 0.5]);
         }
         let [time, sampled] = [stamp + 900, stamp].map(u64::to_le_bytes);
