@@ -30,6 +30,44 @@ fn a_preset_is_reported() {
     assert_eq!(json["preset"]["recognised"], true);
 }
 
+#[test]
+fn the_triads_of_a_file_are_named_beside_the_pair() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let mut log = String::from(
+        "time (ms),ax1,ay1,az1,gx1,gy1,gz1,ax2,ay2,az2,gx2,gy2,gz2,mx (mG),my (mG),mz (mG)\n",
+    );
+    let mut noise = noise();
+    for i in 0..200 {
+        let mut reading = |rest: f64, size: f64| format!("{:.6}", rest + size * noise());
+        let [force, rate] = [[0.1, 0.2, 9.8], [0.01, -0.02, 0.0]];
+        let pair = force
+            .map(|f| reading(f, 0.01))
+            .into_iter()
+            .chain(rate.map(|w| reading(w, 1e-3)));
+        let pair: Vec<String> = pair.collect();
+        let field = [200.0, -10.0, 400.0].map(|f| reading(f, 1.0));
+        let all = [pair.clone(), pair, field.to_vec()].concat().join(",");
+        writeln!(log, "{},{all}", 10 * i).unwrap();
+    }
+    std::fs::write(folder.join("log.csv"), log).unwrap();
+    let options = "--units m/s2,rad/s --gravity 9.81";
+    let text = done(folder, &format!("import log.csv {options} -o rec"));
+    assert!(
+        text.contains("triads: gyro, accel, mag, gyro2, accel2"),
+        "{text}"
+    );
+    assert!(text.contains("magnetometer in mG"), "{text}");
+    let json = done(
+        folder,
+        &format!("import log.csv {options} --json - -o again"),
+    );
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert_eq!(json["triads"].as_array().unwrap().len(), 5);
+    // A pair is fitted and surveyed as before: the others are no part of it.
+    done(folder, "allan rec");
+}
+
 /// Six faces and six edges of an accelerometer of 800 counts per m/s² with a bias of 50 counts on x.
 fn means(with_noise: bool) -> String {
     let (g, half) = (9.81, 0.5_f64.sqrt());

@@ -54,6 +54,7 @@ struct Opening<'a> {
     rate_hz: f64,
     followers: Vec<Follower>,
     time: Vec<TimeSummary>,
+    notes: Vec<String>,
     warnings: Vec<String>,
 }
 
@@ -70,6 +71,7 @@ impl<'a> Opening<'a> {
             rate_hz: f64::NAN,
             followers: Vec::new(),
             time: Vec::new(),
+            notes: Vec::new(),
             warnings: options.preset_warnings.clone(),
         };
         if !opening.first.has_time() {
@@ -128,13 +130,16 @@ impl<'a> Opening<'a> {
             let may_leave = file.is_further() && is_log(path);
             let times = match first_pass::times(path, &how, rate_hz, first) {
                 Err(error) if may_leave => {
-                    self.leave_out(&file, &error.refused().problem);
+                    let said = left_out(&file, &error.refused().problem);
+                    self.warnings.push(said);
                     return Ok(file.parts);
                 }
-                Ok(times) if may_leave && times.summary.rate_hz < SLOWEST_HZ => {
+                Ok(times)
+                    if may_leave && times.summary.rate_hz < SLOWEST_HZ.min(0.5 * self.rate_hz) =>
+                {
                     let rate_hz = times.summary.rate_hz;
                     let why = format!("{rate_hz:.3} Hz are too slow to interpolate between");
-                    self.leave_out(&file, &why);
+                    self.notes.push(left_out(&file, &why));
                     return Ok(file.parts);
                 }
                 times => times?,
@@ -147,16 +152,6 @@ impl<'a> Opening<'a> {
         self.followers
             .push(Follower::new(file, period_s, first_period_s));
         Ok(parts)
-    }
-
-    /// Leaves out further triads of a log that cannot be used. The log was imported for its gyro and accelerometer.
-    fn leave_out(&mut self, file: &ForeignFile, why: &str) {
-        let triads = file.columns().filter_map(Column::triad);
-        let mut triads: Vec<String> = triads.map(|(triad, _)| triad.to_string()).collect();
-        triads.dedup();
-        let (place, triads) = (file_name(file.path()), triads.join(", "));
-        self.warnings
-            .push(format!("{place}: {triads} left out: {why}"));
     }
 
     /// Columns of the values, in the order in which the files give them.
@@ -211,6 +206,15 @@ impl<'a> Opening<'a> {
         let remedy = "name the column with the numbers of the dwells (step)";
         Err(Error::new("import", problem, remedy))
     }
+}
+
+/// What is said of the further triads of a log that are left out. The log was imported for its gyro and accelerometer.
+fn left_out(file: &ForeignFile, why: &str) -> String {
+    let triads = file.columns().filter_map(Column::triad);
+    let mut triads: Vec<String> = triads.map(|(triad, _)| triad.to_string()).collect();
+    triads.dedup();
+    let (place, triads) = (file_name(file.path()), triads.join(", "));
+    format!("{place}: {triads} left out: {why}")
 }
 
 /// How to read a source without `left_out`.
@@ -278,6 +282,7 @@ impl JoinedFiles {
                 time: files.time,
                 without_accel: !columns.accel,
                 triads: columns.triads().collect(),
+                notes: files.notes,
                 warnings,
                 ..ImportSummary::default()
             },

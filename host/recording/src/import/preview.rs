@@ -155,19 +155,19 @@ fn of_lines(lines: &[&[u8]], separator: Option<Separator>, most: usize) -> Optio
 const SENTENCES: [(&str, &str); 4] = [
     (
         "$VNYMR",
-        "-,yaw,pitch,roll,mag_x,mag_y,mag_z,accel_x [m/s²],accel_y [m/s²],accel_z [m/s²],gyro_x [rad/s],gyro_y [rad/s],gyro_z [rad/s]",
+        "-,yaw,pitch,roll,mag_x [gauss],mag_y [gauss],mag_z [gauss],accel_x [m/s²],accel_y [m/s²],accel_z [m/s²],gyro_x [rad/s],gyro_y [rad/s],gyro_z [rad/s]",
     ),
     (
         "$VNQMR",
-        "-,qx,qy,qz,qw,mag_x,mag_y,mag_z,accel_x [m/s²],accel_y [m/s²],accel_z [m/s²],gyro_x [rad/s],gyro_y [rad/s],gyro_z [rad/s]",
+        "-,qx,qy,qz,qw,mag_x [gauss],mag_y [gauss],mag_z [gauss],accel_x [m/s²],accel_y [m/s²],accel_z [m/s²],gyro_x [rad/s],gyro_y [rad/s],gyro_z [rad/s]",
     ),
     (
         "$VNMAR",
-        "-,mag_x,mag_y,mag_z,accel_x [m/s²],accel_y [m/s²],accel_z [m/s²],gyro_x [rad/s],gyro_y [rad/s],gyro_z [rad/s]",
+        "-,mag_x [gauss],mag_y [gauss],mag_z [gauss],accel_x [m/s²],accel_y [m/s²],accel_z [m/s²],gyro_x [rad/s],gyro_y [rad/s],gyro_z [rad/s]",
     ),
     (
         "$VNIMU",
-        "-,mag_x,mag_y,mag_z,accel_x [m/s²],accel_y [m/s²],accel_z [m/s²],gyro_x [rad/s],gyro_y [rad/s],gyro_z [rad/s],temp_c,pressure",
+        "-,mag_x [gauss],mag_y [gauss],mag_z [gauss],accel_x [m/s²],accel_y [m/s²],accel_z [m/s²],gyro_x [rad/s],gyro_y [rad/s],gyro_z [rad/s],temp_c,pressure",
     ),
 ];
 /// Fields of a `sensor_msgs/msg/Imu` as `ros2 topic echo --csv` writes them, up to the readings that count.

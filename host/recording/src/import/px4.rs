@@ -38,8 +38,10 @@ const HEADER: u64 = 16;
 /// The topics that are read.
 const COMBINED: &str = "sensor_combined";
 const SELECTION: &str = "sensor_selection";
-/// The topic of magnetometers, in gauss, and the size of its unit in µT. Before PX4 1.11 its readings are calibrated, which an affine calibration absorbs.
+/// The topics of magnetometers, in gauss, and the size of this unit in µT. The second is calibrated, and so is the first before PX4 1.11: both are affine,
+/// which another calibration absorbs. The default profile of the logger writes the first once a second, the second five times.
 const MAG: &str = "sensor_mag";
+const VEHICLE_MAG: &str = "vehicle_magnetometer";
 const GAUSS_UT: f64 = 100.0;
 /// Topics of one sensor each: gyro and accelerometer.
 const RAW: [&str; 2] = ["sensor_gyro", "sensor_accel"];
@@ -56,6 +58,7 @@ struct Log {
     topics: BTreeMap<(&'static str, u32), Topic>,
     /// Magnetometers by instance.
     mags: BTreeMap<u32, Topic>,
+    vehicle_mags: BTreeMap<u32, Topic>,
     combined: Combined,
     /// Ids of the gyro and the accelerometer in use, each pair with the number of its first sample in `sensor_combined`.
     selected: Vec<(usize, [u32; 2])>,
@@ -118,6 +121,11 @@ impl Log {
                         let instance = u32::from(data.multi_id.value());
                         self.mags.entry(instance).or_default().take(data)
                     }
+                    VEHICLE_MAG => {
+                        let instance = u32::from(data.multi_id.value());
+                        let topic = self.vehicle_mags.entry(instance).or_default();
+                        topic.take_field(data)
+                    }
                     name => match RAW.into_iter().chain(FIFO).find(|raw| *raw == name) {
                         Some(raw) => {
                             let instance = u32::from(data.multi_id.value());
@@ -159,26 +167,32 @@ impl Log {
     /// The readings that `choice` selects, and those of all magnetometers.
     fn chosen(&self, path: &Path, choice: Choice<'_>) -> Result<Vec<Readings>> {
         let mut all = self.inertial(path, choice)?;
-        all.extend(
-            (1..=TriadName::MOST)
-                .zip(&self.mags)
-                .map(|(number, (instance, topic))| {
-                    let triad = TriadName {
-                        kind: TriadKind::Mag,
-                        number,
-                    };
-                    let mut readings = Readings::of_triads([triad]);
-                    for (stamp, values) in topic.stamps_ns.iter().zip(&topic.values) {
-                        readings.push(*stamp, values.map(|gauss| gauss * GAUSS_UT));
-                    }
-                    let (count, named) = (topic.values.len(), topic.named());
-                    readings.notes.push(format!(
-                        "{count} samples of {MAG} instance {instance} ({named})"
-                    ));
-                    readings.sorted()
-                }),
-        );
+        all.extend(self.magnetometers());
         Ok(all)
+    }
+
+    /// The readings of all magnetometers: before calibration, unless those have too few samples.
+    fn magnetometers(&self) -> Vec<Readings> {
+        let most = |of: &BTreeMap<u32, Topic>| of.values().map(|t| t.values.len()).max();
+        let sparse = most(&self.vehicle_mags) > most(&self.mags).map(|count| SPARSE * count);
+        let (name, mags, said) = match sparse {
+            true => (VEHICLE_MAG, &self.vehicle_mags, ", after PX4's calibration"),
+            false => (MAG, &self.mags, ""),
+        };
+        let each = (1..=TriadName::MOST).zip(mags);
+        each.map(|(number, (instance, topic))| {
+            let kind = TriadKind::Mag;
+            let mut readings = Readings::of_triads([TriadName { kind, number }]);
+            for (stamp, values) in topic.stamps_ns.iter().zip(&topic.values) {
+                readings.push(*stamp, values.map(|gauss| gauss * GAUSS_UT));
+            }
+            let (count, named) = (topic.values.len(), topic.named());
+            readings.notes.push(format!(
+                "{count} samples of {name} instance {instance} ({named}){said}"
+            ));
+            readings.sorted()
+        })
+        .collect()
     }
 
     /// The readings of gyro and accelerometer that `choice` selects.

@@ -31,7 +31,8 @@ fn readings_are_in_si_by_the_factors_of_the_header() {
 fn stamps_are_milliseconds_without_a_factor_and_a_magnetometer_is_in_gauss() {
     let text = "CAMERA IMU LOG\ngscale,1\nascale,1\nmscale,0.001\ntime,gx,gy,gz,ax,ay,az,mx,my,mz\n20,1,2,3,0,0,1,70,-80,90\n21,1,2,3,0,0,1,,,\n";
     let readings = read_text(text).unwrap();
-    let mag = readings.roles()[7..].iter().map(|role| role.name());
+    let roles = readings.roles();
+    let mag = roles[7..].iter().map(|role| role.name());
     assert_eq!(mag.collect::<Vec<_>>(), ["mag_x", "mag_y", "mag_z"]);
     let (stamps, values) = rows(readings);
     assert_eq!(stamps, [20_000_000, 21_000_000]);

@@ -231,6 +231,7 @@ fn two_devices() -> Written {
     let mut log = Written::new()
         .format(&format!("sensor_gyro:{SENSOR}"))
         .format(&format!("sensor_accel:{SENSOR}"))
+        .format(&format!("sensor_mag:{SENSOR}"))
         .subscribe(0, 0, "sensor_gyro")
         .subscribe(0, 1, "sensor_accel")
         .subscribe(2, 2, "sensor_accel");
@@ -285,7 +286,6 @@ fn an_instance_is_asked_for_where_there_are_several_and_the_instances_are_listed
 #[test]
 fn all_instances_are_pairs_with_numbers_and_magnetometers_are_in_microtesla() {
     let mut log = two_devices()
-        .format(&format!("sensor_mag:{SENSOR}"))
         .subscribe(0, 3, "sensor_mag")
         .subscribe(1, 4, "sensor_mag");
     for i in 0..10_u16 {
@@ -342,6 +342,43 @@ fn all_instances_are_pairs_with_numbers_and_magnetometers_are_in_microtesla() {
     // Without a choice too, a magnetometer is never the question.
     let chosen = open(&path, None, Some(0)).unwrap();
     assert_eq!(chosen.len(), 4);
+}
+
+#[test]
+fn the_calibrated_magnetometer_of_the_default_profile_is_read_in_place_of_a_sparse_one() {
+    let field = "uint64_t timestamp;uint64_t timestamp_sample;uint32_t device_id;float[3] magnetometer_ga;uint8_t calibration_count;";
+    let mut log = Written::new()
+        .format(&format!("sensor_gyro:{SENSOR}"))
+        .format(&format!("sensor_mag:{SENSOR}"))
+        .format(&format!("vehicle_magnetometer:{field}"))
+        .subscribe(0, 0, "sensor_gyro")
+        .subscribe(0, 1, "sensor_mag")
+        .subscribe(0, 2, "vehicle_magnetometer");
+    for i in 0..20_u64 {
+        let stamp = 5_000 + 200_000 * i;
+        log = log.sensor(0, stamp, 77, [1.0, 2.0, 3.0]);
+        if i.is_multiple_of(5) {
+            log = log.sensor(1, stamp, 78, [0.5, 0.5, 0.5]);
+        }
+        let [time, sampled] = [stamp + 900, stamp].map(u64::to_le_bytes);
+        let [x, y, z] = [0.25_f32, -0.125, i as f32 / 64.0].map(f32::to_le_bytes);
+        log = log.data(
+            2,
+            &[&time, &sampled, &78_u32.to_le_bytes(), &x, &y, &z, &[0]],
+        );
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let mut all = open(&log.save(&folder, "log.ulg"), None, None).unwrap();
+    assert_eq!((all.len(), all[1].len()), (2, 20));
+    says(
+        &all[1].notes[0],
+        &["vehicle_magnetometer instance 0 (device 78), after PX4's"],
+    );
+    let read = rows(&mut all[1]);
+    assert_eq!(
+        read[8],
+        (Stamp::from(1_605_000_000), vec![25.0, -12.5, 12.5])
+    );
 }
 
 #[test]

@@ -53,6 +53,18 @@ impl Topic {
         Some(())
     }
 
+    /// Takes a message of a calibrated magnetometer; `None` if it lacks a field.
+    pub fn take_field(&mut self, data: &DataMessage<'_>) -> Option<()> {
+        let sampled = u64_in(data, "timestamp_sample");
+        let stamp_ns = nanoseconds(sampled.or_else(|| u64_in(data, "timestamp"))?)?;
+        let values = three_in(data, "magnetometer_ga")?;
+        self.begin(data);
+        self.stamps_ns.push(stamp_ns);
+        self.values.push(values);
+        self.temp_c.push(f64::NAN);
+        Some(())
+    }
+
     /// Takes a batch of the sensor's FIFO; its last sample has the time of the message.
     pub fn take_fifo(&mut self, data: &DataMessage<'_>) -> Option<()> {
         let last_ns = nanoseconds(u64_in(data, "timestamp_sample")?)?;
