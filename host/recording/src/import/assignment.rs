@@ -43,7 +43,7 @@ const AVERAGED_COLUMNS: [&str; 6] = [
 impl Role {
     /// Every role there is.
     pub fn all() -> impl Iterator<Item = Role> {
-        Column::all()
+        Column::fixed()
             .map(Role::Column)
             .chain([Role::Sample, Role::Nanoseconds, Role::Averaged(None)])
             .chain((0..6).map(Role::Deviation))

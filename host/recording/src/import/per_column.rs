@@ -128,7 +128,7 @@ impl<M> PerColumn<M> {
 impl Scale {
     /// Whether it holds for readings of a sensor, not only for the time or the temperature.
     pub fn is_of_readings(&self) -> bool {
-        Column::all().any(|column| matches!(column, Column::Raw(_)) && self.applies_to(column))
+        Column::fixed().any(|column| matches!(column, Column::Raw(_)) && self.applies_to(column))
     }
 
     /// The scales of those columns for which `by_hand` has none. If it has some axes of a sensor, the scale is kept for the others.
@@ -136,7 +136,7 @@ impl Scale {
         let free = |column: &Column| Self::given(by_hand, *column).next().is_none();
         let mut beside = Vec::new();
         for scale in scales {
-            let columns: Vec<Column> = Column::all().filter(|c| scale.applies_to(*c)).collect();
+            let columns: Vec<Column> = Column::fixed().filter(|c| scale.applies_to(*c)).collect();
             match columns.iter().all(free) {
                 true => beside.push(scale.clone()),
                 false => beside.extend(columns.into_iter().filter(free).map(|column| Scale {
