@@ -12,8 +12,8 @@ use std::fmt::Write as _;
 use clap::{Args, ValueEnum};
 use mimu::calibration::Calibration;
 use mimu::quantity::Sensor;
+use mimu_recording::TriadName;
 use mimu_recording::error::Result;
-use mimu_recording::{TriadKind, TriadName};
 use serde_json::{Map, Value, json};
 
 use crate::convention::{Bias, Convention, Shape};
@@ -21,7 +21,7 @@ use crate::remaining::{self, Places};
 use crate::{Export, Page, Sources, Target, body, driver};
 
 /// The only magnetometer with a place.
-const MAG: TriadName = TriadName::first(TriadKind::Mag);
+const MAG: TriadName = TriadName::MAG;
 /// How it is written.
 const MAGNETIC: Convention = Convention::to_input(Shape::Whole, Bias::SubtractedFromReadings);
 

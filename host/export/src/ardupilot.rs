@@ -217,7 +217,7 @@ fn compass(of: &FurtherTriad, export: &mut Export) -> Result<()> {
     let (n, s) = (number(of.instance), &of.scale);
     let [on, beside] = SOFT_IRON;
     let most = [-MOST_COMPASS_OFFSET, MOST_COMPASS_OFFSET];
-    let unit = "mG";
+    let unit = " mG";
     for (what, values, decimals, unit, range) in [
         ("OFS", of.offset, 0, unit, most),
         ("DIA", s.diagonal(), 3, "", on),

@@ -10,7 +10,7 @@ use mimu::quantity::{PerSensor, Sensor};
 use mimu::triad::Forward;
 use mimu_core::compensation::Affine;
 use mimu_recording::error::{Argument, Error, Result};
-use mimu_recording::{RawUnit, TriadKind, TriadName};
+use mimu_recording::{RawUnit, TriadName};
 use nalgebra::{Matrix3, Vector3};
 
 use crate::Sources;
@@ -136,10 +136,10 @@ impl Options {
 
 /// The first triad of a kind.
 pub(crate) fn name_of(sensor: Sensor) -> TriadName {
-    TriadName::first(match sensor {
-        Sensor::Gyro => TriadKind::Gyro,
-        Sensor::Accel => TriadKind::Accel,
-    })
+    match sensor {
+        Sensor::Gyro => TriadName::GYRO,
+        Sensor::Accel => TriadName::ACCEL,
+    }
 }
 
 /// Raw readings of `sensor`, for programs that take them.

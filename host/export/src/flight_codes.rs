@@ -5,7 +5,7 @@
 use mimu::quantity::Sensor;
 use mimu::readable::STANDARD_GRAVITY;
 use mimu_recording::error::{Argument, Result};
-use mimu_recording::{RawUnit, TriadKind, TriadName};
+use mimu_recording::{RawUnit, TriadName};
 use nalgebra::Vector3;
 
 use crate::convention::{Convention, within};
@@ -74,7 +74,7 @@ pub(crate) fn codes(
 }
 
 /// The compass of these firmwares.
-const MAG: TriadName = TriadName::first(TriadKind::Mag);
+const MAG: TriadName = TriadName::MAG;
 
 /// The magnetometer in codes: its bias in the convention of the firmware, and the codes for the calibration's unit of the field, on the sensor's own axes.
 /// `None`, with a note, if there is none or its readings are not in codes.

@@ -14,15 +14,15 @@ use std::fmt::Write as _;
 use mimu::calibration::Calibration;
 use mimu::quantity::Sensor;
 use mimu::readable::STANDARD_GRAVITY;
+use mimu_recording::TriadName;
 use mimu_recording::error::Result;
-use mimu_recording::{TriadKind, TriadName};
 
 use crate::convention::{Bias, Convention, Shape};
 use crate::remaining::Places;
 use crate::{Export, Nothing, Page, Sources, Target, body, driver};
 
 /// The only magnetometer with a place.
-const MAG: TriadName = TriadName::first(TriadKind::Mag);
+const MAG: TriadName = TriadName::MAG;
 /// How it is written.
 const MAGNETIC: Convention = Convention::to_input(Shape::Whole, Bias::SubtractedFromReadings);
 

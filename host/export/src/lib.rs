@@ -147,8 +147,8 @@ impl Export {
             Noise::Optional | Noise::Needed => from.other_device(),
             Noise::No | Noise::Only => None,
         };
-        let body = calibration.filter(|_| !T::FURTHER_TRIADS);
-        let notes = notes.into_iter().chain(body.and_then(body::no_place));
+        let without = calibration.filter(|_| !T::FURTHER_TRIADS);
+        let notes = notes.into_iter().chain(without.and_then(body::no_place));
         Self {
             format: "mimu-export/1",
             to: T::NAME,

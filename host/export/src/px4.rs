@@ -15,7 +15,7 @@
 use mimu::calibration::bias_cubic::BiasCubics;
 use mimu::quantity::Sensor;
 use mimu_recording::TriadKind;
-use mimu_recording::error::Result;
+use mimu_recording::error::{Argument, Result};
 
 use crate::convention::{Bias, Convention, Shape, within};
 use crate::parameters::{CONVENTION, Compass, GIVE_FACTOR, LETTERS, Options, Parameter};
@@ -162,9 +162,13 @@ fn further(options: &Options, from: &Sources, export: &mut Export) -> Result<()>
         if of.triad.kind == TriadKind::Gyro {
             continue;
         }
+        let remedy = match of.triad.kind {
+            TriadKind::Mag => (GIVE_FACTOR.0, Argument::MagConversion),
+            _ => GIVE_FACTOR,
+        };
         for (i, letter) in axes() {
             let (name, scale) = (format!("{prefix}_{letter}SCALE"), of.scale[(i, i)]);
-            within((of.triad, i), &name, (scale, 3, ""), SCALES, GIVE_FACTOR)?;
+            within((of.triad, i), &name, (scale, 3, ""), SCALES, remedy)?;
             out.push(Parameter::real(name, scale));
         }
         if of.triad.kind == TriadKind::Mag {

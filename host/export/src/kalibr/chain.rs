@@ -98,7 +98,7 @@ fn unit(
             "{name}: its lever arm is not known: the translation of T_i_b is 0."
         ));
     }
-    let mut pose = Matrix4::identity();
+    let mut pose = Matrix4::<f64>::identity();
     pose.fixed_view_mut::<3, 3>(0, 0).copy_from(&to_unit);
     pose.fixed_view_mut::<3, 1>(0, 3)
         .copy_from(&(-to_unit * r0 * arm));
@@ -136,7 +136,9 @@ fn noise(
     export: &mut Export,
 ) -> Result<()> {
     let (file, number) = (from.noise()?, gyro.triad.number);
-    let gain = |triad: &BodyTriad| Ok(body::readings(triad, false, None, place)?.noise_gain());
+    let gain = |triad: &BodyTriad| -> Result<[f64; 3]> {
+        Ok(body::readings(triad, false, None, place)?.noise_gain())
+    };
     let gains = PerSensor::from([gain(gyro)?, gain(accel)?]);
     let name = format!("imu{}", number - 1);
     match options.noise.walks.of_unit(file, number, &gains)? {
