@@ -12,7 +12,7 @@ use crate::report::table::{interval, number, table, typed};
 
 /// Triads in a row of the drawing, and the size of each, pixels.
 const ROW: usize = 5;
-const CELL: [f64; 2] = [112.0, 116.0];
+const CELL: [f64; 2] = [112.0, 126.0];
 /// Length of a body's axis, and of a triad's, pixels.
 const LENGTHS: [f64; 2] = [40.0, 30.0];
 /// Smallest extent of the drawing of the places, mm: a board's.
@@ -25,7 +25,7 @@ pub fn section(calibration: &Calibration) -> Markup {
         (geometry(all))
         div.figures {
             @if all.iter().any(|triad| triad.rotation_deg.is_some()) {
-                figure.whole { (rotations(all)) figcaption { "The axes of each triad, in colours, and those of its reference, in grey." } }
+                figure.whole { (rotations(all)) figcaption { "The axes of each triad (x orange, y blue, z green) and those of its reference (grey)." } }
             }
             @if all.iter().any(|triad| triad.lever_arm_mm.is_some()) {
                 figure.whole { (places(all)) figcaption { "Where the triads are, in the frame of the reference." } }
@@ -99,10 +99,10 @@ fn rotations(all: &[BodyTriad]) -> Markup {
     };
     let one = Matrix3::identity();
     let drawn = html! { @for (k, (triad, rotation)) in known.iter().enumerate() {
-        @let middle = (CELL[0] * ((k % ROW) as f64 + 0.5), CELL[1] * (k / ROW) as f64 + 62.0);
+        @let middle = (CELL[0] * ((k % ROW) as f64 + 0.5), CELL[1] * (k / ROW) as f64 + 76.0);
         @for axis in 0..3 { (arrow("grid", middle, &one.column(axis).into_owned(), LENGTHS[0])) }
         @for (axis, class) in AXIS_CLASSES.iter().enumerate() { (arrow(class, middle, &rotation.column(axis).into_owned(), LENGTHS[1])) }
-        text class="heading" x=(px(middle.0)) y=(px(middle.1 - 46.0)) text-anchor="middle" { (triad.triad) }
+        text class="heading" x=(px(middle.0)) y=(px(middle.1 - 60.0)) text-anchor="middle" { (triad.triad) }
         @if k == 0 { @for (axis, name) in AXES.iter().enumerate() {
             @let end = seen(&(one.column(axis) * (LENGTHS[0] + 9.0)));
             text class="tick" x=(px(middle.0 + end.0)) y=(px(middle.1 + end.1 + 4.0)) text-anchor="middle" { (name) }
@@ -161,7 +161,7 @@ fn places(all: &[BodyTriad]) -> Markup {
                 @let to = at(view, p);
                 path class="grid" d={ "M" (px(from.0)) " " (px(from.1)) "L" (px(to.0)) " " (px(to.1)) } {}
                 path class="dot" d={ "M" (px(to.0)) " " (px(to.1)) "h0" } {}
-                text class="tick" x=(px(to.0 + 6.0)) y=(px(to.1 - 5.0)) { (name) }
+                text class="tick" x=(px(to.0)) y=(px(to.1 - 8.0)) text-anchor="middle" { (name) }
             }
         }
         path class="ink" d={ "M" (px(8.0)) " " (px(height - 14.0)) "h" (px(bar_mm * scale)) } {}
