@@ -5,7 +5,7 @@ use mimu::calibration::body::BodyTriad;
 use mimu_export::adafruit::{self, Adafruit, Layout};
 use mimu_export::ardupilot::ArduPilot;
 use mimu_export::betaflight::{self, Betaflight};
-use mimu_export::c::{self, C};
+use mimu_export::c;
 use mimu_export::fusion::Fusion;
 use mimu_export::imu_tk::{self, ImuTk};
 use mimu_export::inav::{self, Inav};
@@ -29,8 +29,7 @@ const FIELD_UT: [f64; 3] = [5.4, 20.2, -8.0];
 /// A quarter turn about z.
 const QUARTER: [f64; 3] = [0.0, 0.0, 90.0];
 
-#[allow(non_snake_case)]
-fn triad(name: &str, unit: &str, C: Matrix, o: [f64; 3]) -> BodyTriad {
+fn triad(name: &str, unit: &str, c: Matrix, o: [f64; 3]) -> BodyTriad {
     let triad = TriadName::parse(name).unwrap();
     let reference = if name.starts_with("accel") {
         "accel"
@@ -44,7 +43,7 @@ fn triad(name: &str, unit: &str, C: Matrix, o: [f64; 3]) -> BodyTriad {
         direction: "raw to SI".into(),
         raw_unit: RawUnit::Count,
         unit: unit.into(),
-        C,
+        C: c,
         o,
         sigma_C: [[0.0; 3]; 3],
         sigma_o: [0.0; 3],
@@ -350,7 +349,6 @@ fn a_second_unit_has_its_own_numbers_in_the_autopilots() {
 }
 
 #[test]
-#[allow(non_snake_case)]
 fn kalibr_gets_the_pose_and_the_time_of_a_second_unit() {
     let placed = |name: &str, unit: &str| BodyTriad {
         rotation_deg: Some(QUARTER),
@@ -414,7 +412,7 @@ fn formats_without_a_place_name_what_is_missing_and_complete_ones_have_it() {
     let options = c::Options {
         prefix: "imu".into(),
     };
-    let header = C::export(&from, &options).unwrap();
+    let header = c::C::export(&from, &options).unwrap();
     assert!(text(&header).contains("static const imu_triad imu_body[2] = {"));
     let module = Rust::export(&from, &Nothing {}).unwrap();
     assert!(text(&module).contains("pub const BODY: [FurtherTriad; 2] = ["));
@@ -423,7 +421,7 @@ fn formats_without_a_place_name_what_is_missing_and_complete_ones_have_it() {
     let from = of(&alone);
     let all = [
         Json::export(&from, &Nothing {}),
-        C::export(&from, &options),
+        c::C::export(&from, &options),
         Rust::export(&from, &Nothing {}),
     ];
     for export in all {
