@@ -54,10 +54,19 @@ fn list(names: impl Iterator<Item = TriadName>) -> Option<String> {
     (!names.is_empty()).then(|| names.join(", "))
 }
 
+/// A number with so many decimals; zero has no sign.
+fn rounded(value: f64, digits: usize) -> String {
+    let text = format!("{value:.digits$}");
+    match text.strip_prefix('-') {
+        Some(size) if size.chars().all(|c| matches!(c, '0' | '.')) => size.into(),
+        _ => text,
+    }
+}
+
 /// What a file's head says of a triad.
 pub(crate) fn line(triad: &BodyTriad) -> String {
     let three = |v: [f64; 3], digits: usize| {
-        let values = v.map(|v| format!("{v:.digits$}"));
+        let values = v.map(|v| rounded(v, digits));
         format!("[{}]", values.join(", "))
     };
     let (name, reference) = (triad.triad, triad.reference);
@@ -192,12 +201,12 @@ pub(crate) fn note_rotation(
         return Ok(());
     }
     let (roll, pitch, yaw) = Rotation3::from_matrix_unchecked(*turned).euler_angles();
-    let [roll, pitch, yaw] = [roll, pitch, yaw].map(f64::to_degrees);
+    let [roll, pitch, yaw] = [roll, pitch, yaw].map(|v| rounded(v.to_degrees(), 2));
     let degrees = Rotation3::from_matrix_unchecked(*turned)
         .angle()
         .to_degrees();
     export.note(format!(
-        "{name}: the matrix of the file is symmetric. What it gives still has to be turned by {degrees:.2} deg to the frame of {}, first roll {roll:.2}, then pitch {pitch:.2}, then yaw {yaw:.2} deg: if that is much, set the mounting in the program.",
+        "{name}: the matrix of the file is symmetric. What it gives still has to be turned by {degrees:.2} deg to the frame of {}, first roll {roll}, then pitch {pitch}, then yaw {yaw} deg: if that is much, set the mounting in the program.",
         triad.reference
     ));
     Ok(())
