@@ -99,8 +99,8 @@ def verify(
 
 Format = Literal[
     "c", "rust", "json", "kalibr", "openvins", "vins", "orbslam3", "liosam", "fastlio", "imu-calib", "imu-tk", "fusion", "realsense",
-    "depthai", "basalt", "px4", "ardupilot", "betaflight", "inav", "slimenrf", "pigeon", "iio", "ros-imu", "autoware", "gazebo",
-    "matlab", "core",
+    "depthai", "basalt", "px4", "ardupilot", "betaflight", "inav", "adafruit", "slimenrf", "pigeon", "iio", "ros-imu", "autoware",
+    "gazebo", "matlab", "core",
 ]
 
 

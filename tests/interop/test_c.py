@@ -5,7 +5,9 @@ import subprocess
 
 import numpy
 import pytest
-from conftest import Unit, triad
+import test_adafruit
+import test_autopilots
+from conftest import Unit, run, triad
 
 # A program that reads "follow dt temp" and "sample x y z x y z" and writes six numbers for each sample. The contents of the header depend on the
 # calibration, so the calls do too.
@@ -189,3 +191,32 @@ def test_a_prefix_that_is_no_name_is_refused(unit):
         cwd=unit.folder, capture_output=True, text=True,
     )  # fmt: skip
     assert done.returncode == 1 and "--prefix" in done.stderr and not (unit.folder / "x.h").exists()
+
+
+BODY_MAIN = """
+#include <stdio.h>
+#include "calibration.h"
+int main(void)
+{
+    const float raw[3] = {120.0f, -75.0f, 300.0f};
+    float x[3];
+    const imu_triad *mag = &imu_body[IMU_MAG];
+    imu_triad_reading(mag, raw, x);
+    printf("%s %s %.9g %.9g %.9g %d %d %d\\n", mag->name, mag->reference, x[0], x[1], x[2], mag->has_rotation, mag->has_delay, mag->has_lever_arm);
+    return 0;
+}
+"""
+
+
+@pytest.mark.parametrize("name", ["gcc", "clang"])
+def test_a_further_triad_comes_out_in_the_frame_of_its_reference(name, tmp_path):
+    path = compiler(name)
+    (tmp_path / "cal.toml").write_text(test_autopilots.calibration() + test_adafruit.body())
+    run("export", "c", "--calibration", "cal.toml", "--prefix", "imu", "-o", "calibration.h", cwd=tmp_path)
+    (tmp_path / "main.c").write_text(BODY_MAIN)
+    flags = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror"]
+    subprocess.run([path, *flags, "main.c", "-o", "main"], cwd=tmp_path, check=True)
+    triad_name, reference, *values = subprocess.run([tmp_path / "main"], capture_output=True, text=True, check=True).stdout.split()
+    assert (triad_name, reference, values[3:]) == ("mag", "gyro", ["1", "0", "0"])
+    expected = test_adafruit.QUARTER @ (test_adafruit.SOFT @ [120.0, -75.0, 300.0] + test_adafruit.SHIFT)
+    assert numpy.allclose([float(v) for v in values[:3]], expected, atol=1e-4)

@@ -16,6 +16,7 @@ export const FORMATS = [
   { name: "PX4, for QGroundControl", file: "px4.params", args: ["px4", "--qgc"], of: "calibration" },
   { name: "ArduPilot", file: "ardupilot.parm", args: ["ardupilot"], of: "calibration" },
   { name: "Betaflight", file: "betaflight.txt", args: ["betaflight"], of: "calibration" },
+  { name: "Adafruit (hard and soft iron)", file: "calibration.h", args: ["adafruit"], of: "calibration" },
   { name: "SlimeVR tracker (SlimeNRF)", file: "sens.txt", args: ["slimenrf"], of: "calibration" },
   { name: "Pigeon 2", file: "pigeon.txt", args: ["pigeon"], of: "calibration" },
   { name: "Linux IIO, inv_icm42600", file: "calibbias.sh", args: ["iio"], of: "calibration" },

@@ -8,12 +8,20 @@
 //! and so on). ArduPilot computes `(accel - offset) * scale` and `gyro - offset` after the rotation of the sensor and before that of the board.
 //! Source: libraries/AP_InertialSensor/AP_InertialSensor_Backend.cpp, `_rotate_and_correct_accel` and `_gyro`; AP_InertialSensor.cpp for names and
 //! ranges.
+//!
+//! A magnetometer becomes COMPASS_OFS, in milligauss, which ArduPilot adds, and the symmetric matrix of COMPASS_DIA and COMPASS_ODI (COMPASS_OFS2 and so on for
+//! the second): `matrix * ((mag + offsets) * COMPASS_SCALE)`, after the rotation of its mounting, which those numbers depend on. Source:
+//! libraries/AP_Compass/AP_Compass_Backend.cpp, `correct_field`; AP_Compass.cpp for names and units; CompassCalibrator.cpp, `fit_acceptable`, for ranges.
 
 use mimu::quantity::Sensor;
+use mimu_recording::TriadKind;
 use mimu_recording::error::{Argument, Result};
+use nalgebra::Vector3;
 
-use crate::convention::{Convention, within};
-use crate::parameters::{CONVENTION, GIVE_FACTOR, LETTERS, Options, Parameter};
+use crate::convention::{Bias, Convention, Shape, within};
+use crate::parameters::{
+    CONVENTION, Compass, FurtherTriad, GIVE_FACTOR, LETTERS, Options, Parameter,
+};
 use crate::{Export, Page, Sources, Target};
 
 /// Reference temperature, °C.
@@ -27,6 +35,22 @@ const MOST_OFFSET: f64 = 3.5;
 /// Range of an accelerometer's scale factors that it documents.
 const SCALES: [f64; 2] = [0.8, 1.2];
 
+/// Inertial units, and magnetometers.
+const MOST: u8 = 3;
+/// Its magnetometers.
+const COMPASS: Compass = Compass {
+    unit: ("milligauss", 10.0),
+    convention: Convention::to_input(Shape::RotationSymmetric, Bias::AddedToReadings),
+    formula: "S (v + OFS)",
+    symmetric: "S = [[DIA_X, ODI_X, ODI_Y], [ODI_X, DIA_Y, ODI_Z], [ODI_Y, ODI_Z, DIA_Z]]",
+};
+/// Largest COMPASS_OFFS_MAX, mG.
+const MOST_COMPASS_OFFSET: f64 = 3000.0;
+/// Its default, mG.
+const USUAL_COMPASS_OFFSET: f64 = 1800.0;
+/// Elements of its matrices that it accepts, on the diagonal and beside it.
+const SOFT_IRON: [[f64; 2]; 2] = [[0.2, 5.0], [-1.0, 1.0]];
+
 /// The format.
 pub struct ArduPilot;
 
@@ -34,15 +58,15 @@ impl Target for ArduPilot {
     type Options = Options;
     const NAME: &str = "ardupilot";
     const ABOUT: &str = "Parameters of ArduPilot: INS_TCAL* over temperature, INS_ACCOFFS, INS_ACCSCAL and INS_GYROFFS at one";
-    const CONTENTS: &str =
-        "biases over temperature, or biases and scale factors at one temperature";
+    const CONTENTS: &str = "biases over temperature, or biases and scale factors at one temperature; magnetometers, further units";
     const READERS: &str = "ArduPilot";
     const CONVENTION: Convention = CONVENTION;
     const TAKES_BIASES: bool = true;
+    const FURTHER_TRIADS: bool = true;
     const PAGES: &[Page] = &[Page::of("ArduPilot", "ardupilot.parm")];
 
     /// # Errors
-    /// The calibration is missing, an offset or a scale factor exceeds ArduPilot's range, or an error of `BiasCubics::of`, `BiasCubics::of_rest` or
+    /// The calibration is missing, an offset or a scale factor exceeds ArduPilot's range, an error of `Options::further`, or an error of `BiasCubics::of`, `BiasCubics::of_rest` or
     /// `Conversion::of`.
     fn export(from: &Sources, options: &Options) -> Result<Export> {
         let mut export = Export::new::<Self>(from);
@@ -55,7 +79,7 @@ impl Target for ArduPilot {
         export.note("ArduPilot measures gyro offsets again at every start (INS_GYR_CAL), at the temperature of that start.");
         export.note("It accepts an accelerometer as calibrated only if INS_ACC_ID is its device id: give --accel-id, or calibrate there once and then load this file.");
         for (sensor, id) in options.ids() {
-            let id = id.map(|id| Parameter::int32(name(options, sensor, "_ID"), id));
+            let id = id.map(|id| Parameter::int32(name(options.imu, sensor, "_ID"), id));
             export.parameters.extend(id);
         }
         match &calibration.temperature {
@@ -65,17 +89,24 @@ impl Target for ArduPilot {
             }
             None => at_one_temperature(options, from, &mut export)?,
         }
+        for of in options.further(from, &COMPASS, MOST, &mut export)? {
+            further(&of, &mut export)?;
+        }
         Ok(options.file(export, from))
     }
 }
 
-/// Name of a parameter of a sensor. The first unit has no number.
-fn name(options: &Options, sensor: Sensor, what: &str) -> String {
-    let number = match options.imu {
+/// Number of an instance in a name. The first has none.
+fn number(instance: u8) -> String {
+    match instance {
         1 => String::new(),
-        imu => imu.to_string(),
-    };
-    format!("INS_{}{number}{what}", short(sensor))
+        instance => instance.to_string(),
+    }
+}
+
+/// Name of a parameter of a sensor of this inertial unit.
+fn name(imu: u8, sensor: Sensor, what: &str) -> String {
+    format!("INS_{}{}{what}", short(sensor), number(imu))
 }
 
 /// Cubics and their parameters, over a range that is limited to ArduPilot's.
@@ -114,7 +145,7 @@ fn over_temperature(
 /// Notes on coefficients alone. ArduPilot's own calibration over temperature is made at rest too, and writes the same: it leaves the offsets to the
 /// calibrations at one temperature, with their CALTEMP. Source: libraries/AP_InertialSensor/AP_InertialSensor_tempcal.cpp, `save_calibration`.
 fn at_rest(options: &Options, accel: bool, export: &mut Export) {
-    let (imu, acc) = (options.imu, name(options, Sensor::Accel, ""));
+    let (imu, acc) = (options.imu, name(options.imu, Sensor::Accel, ""));
     export.note(format!("Scale factors and offsets stay the flight controller's own ({acc}SCAL, {acc}OFFS): a recording at rest does not show them."));
     if accel {
         export.note(format!("accel: ArduPilot subtracts what the bias has changed by since the temperature INS_ACC{imu}_CALTEMP of its accelerometer calibration. Repeat that calibration after loading this file if the temperature is missing there (-300)."));
@@ -132,7 +163,7 @@ fn settled(options: &Options, export: &mut Export) -> Result<()> {
         export.parameters.push(Parameter::real(name, settled_c));
         let settled = cubics.at(settled_c);
         for axis in 0..3 {
-            let offset = offset(options, cubics.sensor, axis, settled[axis])?;
+            let offset = offset(options.imu, cubics.sensor, axis, settled[axis])?;
             export.parameters.push(offset);
         }
     }
@@ -143,23 +174,92 @@ fn at_one_temperature(options: &Options, from: &Sources, export: &mut Export) ->
     let imu = options.imu;
     export.note(format!("ArduPilot subtracts INS_TCAL{imu}_* too: set INS_TCAL{imu}_ENABLE to 0, unless they come from a calibration without these offsets."));
     for (sensor, offsets, scale) in options.offsets(from, export)? {
-        for (i, letter) in LETTERS.iter().enumerate() {
-            export
-                .parameters
-                .push(offset(options, sensor, i, offsets[i])?);
-            if sensor == Sensor::Accel {
-                let name = name(options, sensor, &format!("SCAL_{letter}"));
-                within((sensor, i), &name, (scale[i], 3, ""), SCALES, GIVE_FACTOR)?;
-                export.parameters.push(Parameter::real(name, scale[i]));
-            }
+        axes(imu, sensor, [&offsets, &scale], export)?;
+    }
+    Ok(())
+}
+
+/// Offsets and scale factors of an inertial unit's sensor, SI.
+fn axes(
+    imu: u8,
+    sensor: Sensor,
+    [offsets, scale]: [&Vector3<f64>; 2],
+    export: &mut Export,
+) -> Result<()> {
+    for (i, letter) in LETTERS.iter().enumerate() {
+        let out = &mut export.parameters;
+        out.push(offset(imu, sensor, i, offsets[i])?);
+        if sensor == Sensor::Accel {
+            let name = name(imu, sensor, &format!("SCAL_{letter}"));
+            within((sensor, i), &name, (scale[i], 3, ""), SCALES, GIVE_FACTOR)?;
+            out.push(Parameter::real(name, scale[i]));
         }
     }
     Ok(())
 }
 
+/// A further triad.
+fn further(of: &FurtherTriad, export: &mut Export) -> Result<()> {
+    let sensor = match of.triad.kind {
+        TriadKind::Gyro => Sensor::Gyro,
+        TriadKind::Accel => Sensor::Accel,
+        TriadKind::Mag => return compass(of, export),
+    };
+    axes(
+        of.instance,
+        sensor,
+        [&of.offset, &of.scale.diagonal()],
+        export,
+    )
+}
+
+fn compass(of: &FurtherTriad, export: &mut Export) -> Result<()> {
+    let (n, s) = (number(of.instance), &of.scale);
+    let [on, beside] = SOFT_IRON;
+    let most = [-MOST_COMPASS_OFFSET, MOST_COMPASS_OFFSET];
+    let unit = " mG";
+    for (what, values, decimals, unit, range) in [
+        ("OFS", of.offset, 0, unit, most),
+        ("DIA", s.diagonal(), 3, "", on),
+        (
+            "ODI",
+            Vector3::new(s[(0, 1)], s[(0, 2)], s[(1, 2)]),
+            3,
+            "",
+            beside,
+        ),
+    ] {
+        for (i, letter) in LETTERS.iter().enumerate() {
+            let name = format!("COMPASS_{what}{n}_{letter}");
+            let remedy = (
+                "give the factor by which the driver converts",
+                Argument::MagConversion,
+            );
+            within(
+                (of.triad, i),
+                &name,
+                (values[i], decimals, unit),
+                range,
+                remedy,
+            )?;
+            export.parameters.push(Parameter::real(name, values[i]));
+        }
+    }
+    let scale = Parameter::real(format!("COMPASS_SCALE{n}"), 1.0);
+    export.parameters.push(scale);
+    let name = of.triad;
+    if of.offset.amax() > USUAL_COMPASS_OFFSET {
+        export.note(format!(
+            "{name}: an offset exceeds 1800 mG: ArduPilot arms only with a larger COMPASS_OFFS_MAX."
+        ));
+    }
+    export.note(format!("{name}: the numbers are for the readings after the rotation of its mounting (COMPASS_ORIENT{n}, AHRS_ORIENTATION). ArduPilot takes a compass for calibrated only if COMPASS_DEV_ID{n} is its id: calibrate there once, then load this file, with COMPASS_LEARN 0."));
+    Ok(())
+}
+
 /// Parameter of an offset, SI.
-fn offset(options: &Options, sensor: Sensor, axis: usize, offset: f64) -> Result<Parameter> {
-    let name = name(options, sensor, &format!("OFFS_{}", LETTERS[axis]));
+fn offset(imu: u8, sensor: Sensor, axis: usize, offset: f64) -> Result<Parameter> {
+    let name = name(imu, sensor, &format!("OFFS_{}", LETTERS[axis]));
     if sensor == Sensor::Accel {
         let range = [-MOST_OFFSET, MOST_OFFSET];
         let remedy = (

@@ -1,9 +1,12 @@
-//! Biases of the accelerometer for Betaflight, as lines of its CLI.
+//! Biases of the accelerometer and of the compass for Betaflight, as lines of its CLI.
 //!
 //! Betaflight rotates the codes of the accelerometer to the axes of the craft (x forward, y left, z up) and subtracts three whole codes:
 //! `acc_calibration = x,y,z,1`; the last number says that there is a calibration. It has no scale factors, and measures the gyro's bias at every start.
 //! Source: betaflight/betaflight, src/main/sensors/acceleration.c, `accUpdate`, `applyAccelerationTrims`; acceleration_init.c,
 //! `performAccelerometerCalibration`; sensors/boardalignment.c; cli/settings.c, `acc_calibration` (2026-08).
+//!
+//! Of the compass it subtracts `mag_calibration = x,y,z` in codes, after the alignment too. Source: src/main/sensors/compass.c, `compassUpdate`;
+//! cli/settings.c, `mag_calibration`.
 
 use clap::Args;
 use mimu::quantity::Sensor;
@@ -11,7 +14,7 @@ use mimu_recording::error::Result;
 
 use crate::convention::{Bias, Convention, Shape};
 use crate::driver::{self, positive};
-use crate::flight_codes::{codes, whole};
+use crate::flight_codes::{codes, compass, whole, whole_of_compass};
 use crate::remaining;
 use crate::{Export, Page, Sources, Target};
 
@@ -32,11 +35,13 @@ pub struct Betaflight;
 impl Target for Betaflight {
     type Options = Options;
     const NAME: &str = "betaflight";
-    const ABOUT: &str = "Biases of the accelerometer for Betaflight: lines of its CLI";
-    const CONTENTS: &str = "biases of the accelerometer";
+    const ABOUT: &str =
+        "Biases of the accelerometer and the compass for Betaflight: lines of its CLI";
+    const CONTENTS: &str = "biases of the accelerometer and of the compass";
     const READERS: &str = "Betaflight";
     const CONVENTION: Convention =
         Convention::to_input(Shape::Absent, Bias::SubtractedFromReadings);
+    const FURTHER_TRIADS: bool = true;
     const PAGES: &[Page] = &[Page::of("Betaflight", "betaflight.txt")];
 
     /// # Errors
@@ -61,7 +66,16 @@ impl Target for Betaflight {
         export.remaining.push(accel.rounding());
         let zero = |i: usize| whole(i, "acc_calibration", accel.zero[i], [-32768, 32767]);
         let (x, y, z) = (zero(0)?, zero(1)?, zero(2)?);
+        let mut lines = format!("set acc_calibration = {x},{y},{z},1\n");
+        if let Some([zero, gain]) = compass(from, Self::CONVENTION, &mut export)? {
+            let of = |i: usize| whole_of_compass(i, "mag_calibration", zero[i], [-32768, 32767]);
+            let (x, y, z) = (of(0)?, of(1)?, of(2)?);
+            lines += &format!("set mag_calibration = {x},{y},{z}\n");
+            let (mean, most) = (gain.mean(), gain.max() - gain.min());
+            export.formula("mag: output = code - mag_calibration on each axis of the craft, after the alignment of sensor and board");
+            export.note(format!("mag: scale factors and cross terms have no place: the axes differ by up to {:.1} %. Record with mag_calibration = 0,0,0.", 100.0 * most / mean));
+        }
         let head = export.head("#", from);
-        Ok(export.with(format!("{head}set acc_calibration = {x},{y},{z},1\nsave\n")))
+        Ok(export.with(format!("{head}{lines}save\n")))
     }
 }

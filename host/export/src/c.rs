@@ -13,6 +13,7 @@ mod effects;
 
 use clap::Args;
 use mimu::calibration::Calibration;
+use mimu::calibration::body::BodyTriad;
 use mimu::quantity::Sensor;
 use mimu_core::compensation::Affine;
 use mimu_core::die::{BEYOND_C, RATE_SHARE};
@@ -23,7 +24,7 @@ use serde_json::{Value, json};
 
 use crate::remaining::Places;
 use crate::template::fill;
-use crate::{Export, Page, Sources, Target};
+use crate::{Export, Page, Sources, Target, body};
 use effects::Effects;
 
 /// Options of the header.
@@ -43,6 +44,7 @@ impl Target for C {
     const ABOUT: &str = "A C99 header: constants, and functions that convert raw readings to SI";
     const CONTENTS: &str = "everything: affine model, curves, lags of the dies, effects";
     const READERS: &str = "any C99 compiler";
+    const FURTHER_TRIADS: bool = true;
     const PAGES: &[Page] = &[Page::of("C header", "mimu.h")];
 
     /// # Errors
@@ -165,6 +167,9 @@ impl Header<'_> {
             "reference": number(REFERENCE_C),
             "reference_c": REFERENCE_C.to_string(),
             "beyond": number(BEYOND_C),
+            "body": self.body(),
+            "triads": self.calibration.body.len(),
+            "first": self.calibration.body.first().map(|t| t.triad.to_string().to_uppercase()),
         });
         if let (Value::Object(all), Value::Object(more)) = (&mut values, more) {
             all.extend(more);
@@ -192,6 +197,36 @@ impl Header<'_> {
             "C": rows(&model.matrix),
             "o": list(model.offset.iter().copied()),
         }))
+    }
+
+    /// The further triads.
+    fn body(&self) -> Value {
+        let of = |(at, triad): (usize, &BodyTriad)| {
+            let model = triad.in_reference();
+            let rotation = triad.rotation();
+            let known = [
+                rotation.is_some(),
+                triad.delay_ms.is_some(),
+                triad.lever_arm_mm.is_some(),
+            ];
+            let known = known.map(|k| u8::from(k).to_string()).join(", ");
+            let arm_m = triad.lever_arm_mm.unwrap_or_default().map(|mm| 1e-3 * mm);
+            json!({
+                "at": at,
+                "NAME": triad.triad.to_string().to_uppercase(),
+                "name": triad.triad.to_string(),
+                "line": body::line(triad),
+                "reference": triad.reference.to_string(),
+                "unit": triad.unit,
+                "C": rows(&model.matrix),
+                "o": list(model.offset.iter().copied()),
+                "R": rows(&rotation.unwrap_or_else(Matrix3::identity)),
+                "has": known,
+                "delay_s": number(1e-3 * triad.delay_ms.unwrap_or_default()),
+                "lever_arm_m": list(arm_m),
+            })
+        };
+        self.calibration.body.iter().enumerate().map(of).collect()
     }
 
     /// Sensors with curves: their nodes, and the filter of their dies' lag.

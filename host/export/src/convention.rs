@@ -11,7 +11,8 @@
 //! M is C or P, as [`Shape`] says how much of it. The frame is that of the calibration where a format does not say another. A reader of a program's file
 //! gets C from `left right` (or P), and o or b from β by the same table.
 
-use mimu::quantity::{AXES, Sensor};
+use mimu::quantity::AXES;
+use mimu_recording::TriadName;
 use mimu_recording::error::{Argument, Error, Result};
 use nalgebra::{Matrix3, Vector3};
 
@@ -50,6 +51,8 @@ pub enum Shape {
     MisalignmentSensitivity,
     /// A triangular matrix, times a rotation.
     TriangleRotation(Triangle),
+    /// A rotation, times a symmetric matrix. Programs store the symmetric one.
+    RotationSymmetric,
     /// A factor for each axis: the diagonal of P, or one over it.
     Axes,
     /// Nothing.
@@ -103,11 +106,12 @@ impl Convention {
         let one = Matrix3::identity();
         let (left, right) = match self.shape {
             Shape::Whole => (matrix, one),
-            Shape::MisalignmentSensitivity => misalignment(&matrix, readings.sensor)?,
+            Shape::MisalignmentSensitivity => misalignment(&matrix, readings.triad)?,
             Shape::TriangleRotation(half) => {
                 let factors = Factors::of(&matrix, half);
                 (factors.triangle, factors.rotation)
             }
+            Shape::RotationSymmetric => polar(&matrix),
             Shape::Axes => {
                 let gain = readings.forward.matrix.diagonal();
                 let axes = match self.maps {
@@ -138,7 +142,7 @@ impl Convention {
 /// # Errors
 /// It is outside.
 pub(crate) fn within(
-    (sensor, axis): (Sensor, usize),
+    (triad, axis): (impl std::fmt::Display, usize),
     name: &str,
     (value, decimals, unit): (f64, usize, &str),
     [least, most]: [f64; 2],
@@ -149,7 +153,7 @@ pub(crate) fn within(
     }
     let problem =
         format!("{name} would be {value:.decimals$}{unit}, but its range is {least} to {most}");
-    let place = format!("{sensor}, axis {}", AXES[axis]);
+    let place = format!("{triad}, axis {}", AXES[axis]);
     Err(Error::new(place, problem, remedy).about(argument))
 }
 
@@ -160,7 +164,7 @@ const LEAST_ALONG: f64 = 0.1;
 ///
 /// # Errors
 /// An axis of the readings hardly measures the same axis of the body: T would contain a permutation.
-fn misalignment(inverse: &Matrix3<f64>, sensor: Sensor) -> Result<(Matrix3<f64>, Matrix3<f64>)> {
+fn misalignment(inverse: &Matrix3<f64>, triad: TriadName) -> Result<(Matrix3<f64>, Matrix3<f64>)> {
     let sensitivity = inverse.diagonal();
     for (i, axis) in AXES.iter().enumerate() {
         let share = (sensitivity[i] / inverse.column(i).norm()).abs();
@@ -170,15 +174,21 @@ fn misalignment(inverse: &Matrix3<f64>, sensor: Sensor) -> Result<(Matrix3<f64>,
                 100.0 * share
             );
             let remedy = "order the columns as the body's axes, and calibrate again";
-            return Err(Error::new(
-                format!("{sensor}, axis {axis}"),
-                problem,
-                remedy,
-            ));
+            return Err(Error::new(format!("{triad}, axis {axis}"), problem, remedy));
         }
     }
     let back = Matrix3::from_diagonal(&sensitivity.map(f64::recip));
     Ok((inverse * back, Matrix3::from_diagonal(&sensitivity)))
+}
+
+/// The polar factors of a regular matrix: `rotation symmetric`, the symmetric one positive definite. The rotation mirrors if the matrix does.
+fn polar(matrix: &Matrix3<f64>) -> (Matrix3<f64>, Matrix3<f64>) {
+    let eigen = (matrix.transpose() * matrix).symmetric_eigen();
+    let root = |power: f64| {
+        let values = eigen.eigenvalues.map(|v| v.powf(power));
+        eigen.eigenvectors * Matrix3::from_diagonal(&values) * eigen.eigenvectors.transpose()
+    };
+    (matrix * root(-0.5), root(0.5))
 }
 
 /// Which half of the matrix is not zero.
@@ -229,6 +239,16 @@ mod tests {
     use super::*;
     use mimu::calibration::bias_cubic::Conversion;
     use mimu::triad::Forward;
+    use mimu_recording::TriadKind;
+
+    #[test]
+    fn the_symmetric_factor_keeps_sizes_and_what_is_left_is_a_rotation() {
+        let quarter = Matrix3::new(0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0);
+        let soft_iron = Matrix3::new(1.1, 0.05, 0.0, 0.05, 0.9, -0.02, 0.0, -0.02, 1.0);
+        let (rotation, symmetric) = polar(&(quarter * soft_iron));
+        assert!((rotation - quarter).amax() < 1e-12);
+        assert!((symmetric - soft_iron).amax() < 1e-12);
+    }
 
     #[test]
     fn the_equation_of_every_convention_holds_between_input_and_readings() {
@@ -238,7 +258,8 @@ mod tests {
         let y = matrix * x + bias;
         let forward = Forward { matrix, bias };
         let readings = Readings {
-            sensor: Sensor::Accel,
+            triad: TriadName::first(TriadKind::Accel),
+            unit: "m/s^2".into(),
             conversion: Conversion {
                 si_per_raw: [1.0; 3],
                 zero_raw: [0.0; 3],
@@ -251,6 +272,7 @@ mod tests {
             Shape::MisalignmentSensitivity,
             Shape::TriangleRotation(Triangle::Lower),
             Shape::TriangleRotation(Triangle::Upper),
+            Shape::RotationSymmetric,
         ] {
             let of = |convention: Convention| {
                 let parts = convention.of(&readings).unwrap();

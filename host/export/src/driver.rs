@@ -9,8 +9,8 @@ use mimu::calibration::bias_cubic::{Conversion, KnownConversion};
 use mimu::quantity::{PerSensor, Sensor};
 use mimu::triad::Forward;
 use mimu_core::compensation::Affine;
-use mimu_recording::RawUnit;
 use mimu_recording::error::{Argument, Error, Result};
+use mimu_recording::{RawUnit, TriadName};
 use nalgebra::{Matrix3, Vector3};
 
 use crate::Sources;
@@ -36,12 +36,14 @@ pub struct Options {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Readings {
     /// The triad.
-    pub sensor: Sensor,
+    pub triad: TriadName,
+    /// Unit of the input and of the driver's readings.
+    pub unit: String,
     /// From raw readings to the driver's.
     pub conversion: Conversion,
-    /// From the input to the driver's readings, SI to SI.
+    /// From the input to the driver's readings, unit to unit.
     pub forward: Forward,
-    /// From the driver's readings to the input, SI to SI.
+    /// From the driver's readings to the input, unit to unit.
     pub inverse: Affine<f64>,
 }
 
@@ -125,34 +127,18 @@ impl Options {
             let problem = format!("the {sensor} is not calibrated");
             Error::new(place, problem, "fit a recording that determines it")
         })?;
-        let raw = Forward::of(&model).ok_or_else(|| {
-            let problem = format!("C of the {sensor} is singular");
-            Error::new(place, problem, "fit the recording again")
-        })?;
-        let known = self.conversions()[sensor];
-        let si = calibration.recording.raw_unit == RawUnit::Si;
-        let factors = Vector3::from_fn(|i, _| match known.si_per_raw {
-            Some(factor) => factor,
-            None if si => 1.0,
-            None => 1.0 / raw.matrix.row(i).norm(),
-        });
-        let zero = Vector3::repeat(known.zero_raw.unwrap_or(0.0));
-        let back = Matrix3::from_diagonal(&factors.map(f64::recip));
-        Ok(Readings {
-            sensor,
-            conversion: Conversion {
-                si_per_raw: factors.into(),
-                zero_raw: zero.into(),
-            },
-            forward: Forward {
-                matrix: Matrix3::from_diagonal(&factors) * raw.matrix,
-                bias: factors.component_mul(&(raw.bias - zero)),
-            },
-            inverse: Affine {
-                matrix: model.matrix * back,
-                offset: model.matrix * zero + model.offset,
-            },
-        })
+        let (triad, unit) = (name_of(sensor), sensor.unit());
+        let raw_unit = calibration.recording.raw_unit;
+        let known = &self.conversions()[sensor];
+        Readings::of((triad, unit), &model, known, raw_unit, place)
+    }
+}
+
+/// The first triad of a kind.
+pub(crate) fn name_of(sensor: Sensor) -> TriadName {
+    match sensor {
+        Sensor::Gyro => TriadName::GYRO,
+        Sensor::Accel => TriadName::ACCEL,
     }
 }
 
@@ -187,13 +173,53 @@ fn finite(text: &str) -> std::result::Result<f64, String> {
 }
 
 impl Readings {
+    /// The driver's readings of a triad, `model` raw to its unit; a factor that is not known as for [`Options::readings`].
+    ///
+    /// # Errors
+    /// C is singular.
+    pub(crate) fn of(
+        (triad, unit): (TriadName, &str),
+        model: &Affine<f64>,
+        known: &KnownConversion,
+        raw_unit: RawUnit,
+        place: &str,
+    ) -> Result<Self> {
+        let raw = Forward::of(model).ok_or_else(|| {
+            let problem = format!("C of the {triad} is singular");
+            Error::new(place, problem, "fit the recording again")
+        })?;
+        let factors = Vector3::from_fn(|i, _| match known.si_per_raw {
+            Some(factor) => factor,
+            None if raw_unit == RawUnit::Si => 1.0,
+            None => 1.0 / raw.matrix.row(i).norm(),
+        });
+        let zero = Vector3::repeat(known.zero_raw.unwrap_or(0.0));
+        let back = Matrix3::from_diagonal(&factors.map(f64::recip));
+        Ok(Self {
+            triad,
+            unit: unit.into(),
+            conversion: Conversion {
+                si_per_raw: factors.into(),
+                zero_raw: zero.into(),
+            },
+            forward: Forward {
+                matrix: Matrix3::from_diagonal(&factors) * raw.matrix,
+                bias: factors.component_mul(&(raw.bias - zero)),
+            },
+            inverse: Affine {
+                matrix: model.matrix * back,
+                offset: model.matrix * zero + model.offset,
+            },
+        })
+    }
+
     /// Describes the driver's conversion for the head of a file.
     pub fn line(&self) -> String {
         let [factors, zeros] = [self.conversion.si_per_raw, self.conversion.zero_raw];
         let list = |values: [f64; 3]| values.map(|v| format!("{v:.6e}")).join(", ");
-        let (sensor, unit) = (self.sensor, self.sensor.unit());
+        let (triad, unit) = (self.triad, &self.unit);
         if (factors, zeros) == ([1.0; 3], [0.0; 3]) {
-            return format!("{sensor}: the program's readings are the recorded ones.");
+            return format!("{triad}: the program's readings are the recorded ones.");
         }
         let raw = match zeros {
             [0.0, 0.0, 0.0] => "raw".into(),
@@ -201,7 +227,7 @@ impl Readings {
         };
         let factors = list(factors);
         format!(
-            "{sensor}: readings of the program = [{factors}] {raw}, axis by axis, raw to {unit}: the driver has to convert in this way."
+            "{triad}: readings of the program = [{factors}] {raw}, axis by axis, raw to {unit}: the driver has to convert in this way."
         )
     }
 

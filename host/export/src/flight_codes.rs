@@ -1,16 +1,16 @@
-//! The accelerometer in the codes of a flight controller of the Cleanflight family, Betaflight and INAV.
+//! The accelerometer and the compass in the codes of a flight controller of the Cleanflight family, Betaflight and INAV.
 //!
 //! Their drivers deliver whole codes, `acc_1G` of them for 1 g, whatever the unit's scale factor. The firmware subtracts whole codes.
 
 use mimu::quantity::Sensor;
 use mimu::readable::STANDARD_GRAVITY;
-use mimu_recording::RawUnit;
 use mimu_recording::error::{Argument, Result};
+use mimu_recording::{RawUnit, TriadName};
 use nalgebra::Vector3;
 
 use crate::convention::{Convention, within};
 use crate::remaining::{self, Places, Remaining};
-use crate::{Export, Sources, driver};
+use crate::{Export, Sources, body, driver};
 
 /// Biases and scale factors of the accelerometer in codes.
 pub(crate) struct Codes {
@@ -73,22 +73,74 @@ pub(crate) fn codes(
     })
 }
 
-/// `value` of an axis as a whole number within `range`.
+/// The compass of these firmwares.
+const MAG: TriadName = TriadName::MAG;
+
+/// The magnetometer in codes: its bias in the convention of the firmware, and the codes for the calibration's unit of the field, on the sensor's own axes.
+/// `None`, with a note, if there is none or its readings are not in codes.
+///
+/// # Errors
+/// C is singular.
+pub(crate) fn compass(
+    from: &Sources,
+    convention: Convention,
+    export: &mut Export,
+) -> Result<Option<[Vector3<f64>; 2]>> {
+    let (calibration, place) = from.calibration()?;
+    let others = body::left_out(calibration, |name| name == MAG);
+    export.notes.extend(others);
+    let Some(mag) = calibration.body.iter().find(|triad| triad.triad == MAG) else {
+        return Ok(None);
+    };
+    if mag.raw_unit != RawUnit::Count {
+        export.note(format!(
+            "{MAG}: its readings are in {}, not in codes of the firmware, so nothing is written for it.",
+            body::raw_unit(mag)
+        ));
+        return Ok(None);
+    }
+    let readings = body::readings(mag, true, Some(1.0), place)?;
+    let bias = convention.of(&readings)?.bias;
+    Ok(Some([bias, readings.forward.matrix.diagonal().abs()]))
+}
+
+/// `value` of an axis of the accelerometer as a whole number within `range`.
 ///
 /// # Errors
 /// It is outside.
 pub(crate) fn whole(axis: usize, name: &str, value: f64, range: [i32; 2]) -> Result<i32> {
-    let rounded = value.round();
     let remedy = (
         "check --acc-1g, and give the factor by which the readings were converted",
         Argument::AccelConversion,
     );
-    within(
-        (Sensor::Accel, axis),
-        name,
-        (rounded, 0, ""),
-        range.map(f64::from),
-        remedy,
-    )?;
+    rounded((Sensor::Accel, axis), name, value, range, remedy)
+}
+
+/// The same of the compass.
+///
+/// # Errors
+/// It is outside.
+pub(crate) fn whole_of_compass(
+    axis: usize,
+    name: &str,
+    value: f64,
+    range: [i32; 2],
+) -> Result<i32> {
+    let remedy = (
+        "record the codes of the firmware, and fit again",
+        Argument::RawUnit,
+    );
+    rounded((MAG, axis), name, value, range, remedy)
+}
+
+fn rounded(
+    of: (impl std::fmt::Display, usize),
+    name: &str,
+    value: f64,
+    range: [i32; 2],
+    remedy: (&str, Argument),
+) -> Result<i32> {
+    let rounded = value.round();
+    within(of, name, (rounded, 0, ""), range.map(f64::from), remedy)?;
     Ok(rounded as i32)
 }

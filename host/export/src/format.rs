@@ -61,6 +61,8 @@ pub trait Target {
     const NOISE: Noise = Noise::No;
     /// Whether it can be written from biases over temperature alone.
     const TAKES_BIASES: bool = false;
+    /// Whether it has a place for triads beyond the first gyro and accelerometer.
+    const FURTHER_TRIADS: bool = false;
     /// Its entries of the page.
     const PAGES: &[Page] = &[];
 

@@ -2,18 +2,29 @@
 //!
 //! `calibrated = misalignment (sensitivity ∘ (uncalibrated - offset))`, raw readings to deg/s and g, the units of its AHRS. Therefore misalignment
 //! times the diagonal of sensitivity is C, and offset is the bias of the raw readings. The function is `FusionModelInertial`, or
-//! `FusionCalibrationInertial` in versions before 1.3, and `imufusion.model_inertial` in Python. Names as in its example. Source:
-//! xioTechnologies/Fusion, Fusion/FusionModel.h, Examples/C/Advanced/main.c (2026-08).
+//! `FusionCalibrationInertial` in versions before 1.3, and `imufusion.model_inertial` in Python. Names as in its example.
+//!
+//! A magnetometer: `calibrated = softIronMatrix (uncalibrated - hardIronOffset)`, in any unit, as its AHRS takes the direction only; softIronMatrix is R C, so
+//! the field is in the frame of the gyro. The function is `FusionModelMagnetic`, before 1.3 `FusionCalibrationMagnetic`.
+//!
+//! Source: xioTechnologies/Fusion, Fusion/FusionModel.h, Examples/C/Advanced/main.c (2026-08).
 
 use std::fmt::Write as _;
 
+use mimu::calibration::Calibration;
 use mimu::quantity::Sensor;
 use mimu::readable::STANDARD_GRAVITY;
+use mimu_recording::TriadName;
 use mimu_recording::error::Result;
 
 use crate::convention::{Bias, Convention, Shape};
 use crate::remaining::Places;
-use crate::{Export, Nothing, Page, Sources, Target, driver};
+use crate::{Export, Nothing, Page, Sources, Target, body, driver};
+
+/// The only magnetometer with a place.
+const MAG: TriadName = TriadName::MAG;
+/// How it is written.
+const MAGNETIC: Convention = Convention::to_input(Shape::Whole, Bias::SubtractedFromReadings);
 
 /// The format.
 pub struct Fusion;
@@ -21,11 +32,12 @@ pub struct Fusion;
 impl Target for Fusion {
     type Options = Nothing;
     const NAME: &str = "fusion";
-    const ABOUT: &str = "Both triads for Fusion of x-io: a header in C";
-    const CONTENTS: &str = "C and o of both triads, in deg/s and g";
+    const ABOUT: &str = "Gyro, accelerometer and magnetometer for Fusion of x-io: a header in C";
+    const CONTENTS: &str = "C and o of both triads, in deg/s and g, and of a magnetometer";
     const READERS: &str = "Fusion of x-io Technologies, in C";
     const CONVENTION: Convention =
         Convention::to_input(Shape::MisalignmentSensitivity, Bias::SubtractedFromReadings);
+    const FURTHER_TRIADS: bool = true;
     const PAGES: &[Page] = &[Page::of("Fusion (x-io)", "fusion.h")];
 
     /// # Errors
@@ -49,36 +61,28 @@ impl Target for Fusion {
             ));
             let misalignment = parts.left.transpose();
             let sensitivity = per_si * parts.right.diagonal();
-            for (kind, what, values, unit) in [
-                (
-                    "Matrix",
-                    "Misalignment",
-                    misalignment.as_slice(),
-                    "1, by rows".into(),
-                ),
-                (
-                    "Vector",
-                    "Sensitivity",
-                    sensitivity.as_slice(),
-                    format!("{unit} per {raw_unit}"),
-                ),
-                (
-                    "Vector",
-                    "Offset",
-                    parts.bias.as_slice(),
-                    raw_unit.to_string(),
-                ),
-            ] {
-                let values: Vec<String> =
-                    values.iter().map(|v| format!("{:?}f", *v as f32)).collect();
-                let values = values.join(", ");
-                let _ = writeln!(
-                    body,
-                    "static const Fusion{kind} {name}{what} = {{{{{values}}}}}; // {unit}"
-                );
-            }
+            let per_raw = format!("{unit} per {raw_unit}");
+            let (matrix, raw) = (misalignment.as_slice(), raw_unit.to_string());
+            let of = |what: &str| format!("{name}{what}");
+            constant(
+                &mut body,
+                "Matrix",
+                &of("Misalignment"),
+                matrix,
+                "1, by rows",
+            );
+            let values = sensitivity.as_slice();
+            constant(&mut body, "Vector", &of("Sensitivity"), values, &per_raw);
+            constant(
+                &mut body,
+                "Vector",
+                &of("Offset"),
+                parts.bias.as_slice(),
+                &raw,
+            );
             body.push('\n');
         }
+        magnetometer(calibration, place, &mut body, &mut export)?;
         export.note("FusionModelInertial(raw, misalignment, sensitivity, offset); before version 1.3 FusionCalibrationInertial. 1 g is 9.80665 m/s^2.");
         export.temperature(calibration);
         export.leaves(calibration, Places::Matrix);
@@ -87,4 +91,42 @@ impl Target for Fusion {
             "{head}\n#ifndef MIMU_FUSION_CALIBRATION_H\n#define MIMU_FUSION_CALIBRATION_H\n\n#include \"Fusion.h\"\n\n{body}#endif\n"
         )))
     }
+}
+
+/// A constant of the header.
+fn constant(out: &mut String, kind: &str, name: &str, values: &[f64], unit: &str) {
+    let values: Vec<String> = values.iter().map(|v| format!("{:?}f", *v as f32)).collect();
+    let values = values.join(", ");
+    let _ = writeln!(
+        out,
+        "static const Fusion{kind} {name} = {{{{{values}}}}}; // {unit}"
+    );
+}
+
+fn magnetometer(
+    calibration: &Calibration,
+    place: &str,
+    out: &mut String,
+    export: &mut Export,
+) -> Result<()> {
+    let others = body::left_out(calibration, |name| name == MAG);
+    export.notes.extend(others);
+    let Some(mag) = calibration.body.iter().find(|triad| triad.triad == MAG) else {
+        return Ok(());
+    };
+    let parts = MAGNETIC.of(&body::readings(mag, false, Some(1.0), place)?)?;
+    let (raw, unit) = (body::raw_unit(mag), &mag.unit);
+    let frame = match mag.rotation_deg {
+        Some(_) => "in the frame of the calibration",
+        None => "in its own frame",
+    };
+    export.formula(format!(
+        "magnetometer: calibrated = softIronMatrix * (raw - hardIronOffset), {raw} to {unit}, {frame}: FusionModelMagnetic(raw, softIronMatrix, hardIronOffset)"
+    ));
+    let matrix = parts.left.transpose();
+    let per_raw = format!("{unit} per {raw}, by rows");
+    constant(out, "Matrix", "softIronMatrix", matrix.as_slice(), &per_raw);
+    constant(out, "Vector", "hardIronOffset", parts.bias.as_slice(), &raw);
+    out.push('\n');
+    Ok(())
 }

@@ -5,7 +5,7 @@ use mimu::noise::noise_file::NoiseFile;
 use mimu::quantity::Sensor;
 
 use crate::judged::JudgedSource;
-use crate::{Export, Noise, Sources};
+use crate::{Export, Noise, Sources, body};
 
 /// Header of a file, without comment signs.
 pub(crate) fn of(export: &Export, from: &Sources) -> Vec<String> {
@@ -32,6 +32,8 @@ pub(crate) fn of(export: &Export, from: &Sources) -> Vec<String> {
         );
         lines.extend(noise.map(|noise| format!("noise of {} {}", noise.device, rested(noise))));
         lines.extend(Sensor::BOTH.iter().flat_map(|s| of_sensor(of, *s)));
+        let further = of.body.iter().filter(|_| export.further_triads);
+        lines.extend(further.map(body::line));
     } else if let Some(of) = from.biases {
         let (unit, date, raw_unit) = (unit(&of.unit_id), &of.created, of.recording.raw_unit);
         begin(

@@ -1,20 +1,26 @@
-//! Biases and scale factors of the accelerometer for INAV, as lines of its CLI.
+//! Biases and scale factors of the accelerometer and of the compass for INAV, as lines of its CLI.
 //!
 //! INAV computes `(code - acczero) accgain / 4096` on the axes of the sensor, before it rotates them to those of the craft. All numbers are whole. It
 //! has no scale factors of the gyro, and measures the gyro's bias at every start (`init_gyro_cal`). Source: iNavFlight/inav,
 //! src/main/sensors/acceleration.c, `applyAccelerationZero`, `accUpdate`; sensors/gyro.c, `gyroUpdateAndCalibrate`; docs/Settings.md (2026-07).
+//!
+//! Of the compass it computes `(code - magzero) 1024 / maggain` on the axes of the sensor: maggain is the reading for the field, and the output for the field
+//! is 1024. INAV uses its direction only. Source: src/main/sensors/compass.c, `compassUpdate`.
 
 use clap::Args;
 use mimu::quantity::AXES;
 use mimu_recording::error::Result;
 
+use crate::body::FIELD;
 use crate::convention::{Bias, Convention, Shape};
 use crate::driver::{self, positive};
-use crate::flight_codes::{codes, whole};
+use crate::flight_codes::{codes, compass, whole, whole_of_compass};
 use crate::{Export, Sources, Target};
 
 /// INAV's gain of a scale factor of 1.
 const UNITY: f64 = 4096.0;
+/// Field for which the compass's output is 1024 if the calibration has it in microtesla: only ratios of the axes count.
+const TYPICAL_FIELD_UT: f64 = 50.0;
 
 /// Options of the lines.
 #[derive(Debug, Clone, Args)]
@@ -33,10 +39,12 @@ pub struct Inav;
 impl Target for Inav {
     type Options = Options;
     const NAME: &str = "inav";
-    const ABOUT: &str = "Biases and scale factors of the accelerometer for INAV: lines of its CLI";
-    const CONTENTS: &str = "biases and scale factors of the accelerometer";
+    const ABOUT: &str =
+        "Biases and scale factors of the accelerometer and the compass for INAV: lines of its CLI";
+    const CONTENTS: &str = "biases and scale factors of the accelerometer and of the compass";
     const READERS: &str = "INAV";
     const CONVENTION: Convention = Convention::to_input(Shape::Axes, Bias::SubtractedFromReadings);
+    const FURTHER_TRIADS: bool = true;
 
     /// # Errors
     /// No accelerometer is calibrated, C is singular, or a number is outside INAV's range.
@@ -65,7 +73,34 @@ impl Target for Inav {
             let gain = whole(i, &name, UNITY / accel.gain[i], [1, 8192])?;
             gains += &format!("set {name} = {gain}\n");
         }
+        let compass = compass_lines(from, &mut export)?;
         let head = export.head("#", from);
-        Ok(export.with(head + &zeros + &gains + "save\n"))
+        Ok(export.with(head + &zeros + &gains + &compass + "save\n"))
     }
+}
+
+fn compass_lines(from: &Sources, export: &mut Export) -> Result<String> {
+    let (mut zeros, mut gains) = (String::new(), String::new());
+    let Some([zero, gain]) = compass(from, Inav::CONVENTION, export)? else {
+        return Ok(zeros);
+    };
+    let (calibration, _) = from.calibration()?;
+    let in_field = calibration.body.iter().any(|triad| triad.unit == FIELD);
+    let (field, words) = match in_field {
+        true => (1.0, "the field".into()),
+        false => (TYPICAL_FIELD_UT, format!("{TYPICAL_FIELD_UT} uT")),
+    };
+    for (i, axis) in AXES.iter().enumerate() {
+        let name = format!("magzero_{axis}");
+        let value = whole_of_compass(i, &name, zero[i], [-32768, 32767])?;
+        zeros += &format!("set {name} = {value}\n");
+        let name = format!("maggain_{axis}");
+        let value = whole_of_compass(i, &name, field * gain[i], [1, 32767])?;
+        gains += &format!("set {name} = {value}\n");
+    }
+    export.formula(format!(
+        "mag: output = (code - magzero) 1024 / maggain on each axis of the sensor, 1024 for {words}"
+    ));
+    export.note("mag: axes have to be those of the sensor, before align_mag, and the codes those with magzero 0 and maggain 1024. Its cross terms have no place.");
+    Ok(zeros + &gains)
 }

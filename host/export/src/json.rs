@@ -34,6 +34,7 @@ impl Target for Json {
     const ABOUT: &str = "JSON with the contents of the calibration file, and a schema";
     const CONTENTS: &str = "everything, with the uncertainty";
     const READERS: &str = "any program; [its schema](calibration.schema.json)";
+    const FURTHER_TRIADS: bool = true;
     const PAGES: &[Page] = &[Page::of("JSON", "calibration.json")];
 
     /// # Errors
@@ -42,6 +43,9 @@ impl Target for Json {
         let (calibration, place) = from.calibration()?;
         let mut export = Export::new::<Self>(from);
         export.formula("x = C u + o, raw to SI, and u = P x + b, SI to raw; C and P by rows.");
+        if !calibration.body.is_empty() {
+            export.formula("body: x = C u + o in the triad's own frame, in its unit; R x is in the frame of its reference, R the rotation by the vector rotation_deg.");
+        }
         if calibration.temperature.is_some() {
             export.formula("Over temperature a number p and its slope s are (1+2w)(1-w)^2 p0 + w^2(3-2w) p1 + h w(1-w)^2 s0 - h w^2(1-w) s1 between two nodes, h apart, w from 0 to 1.");
         }

@@ -15,6 +15,8 @@
 //! below `imu0`. Source: ethz-asl/kalibr, kalibr_imu_camera_calibration/IccSensors.py, `IccScaledMisalignedImu`; kalibr_common/ConfigReader.py,
 //! `ImuParameters` (2024-03).
 
+mod chain;
+
 use std::fmt::Write as _;
 
 use clap::Args;
@@ -23,7 +25,8 @@ use mimu_allan::model::Term;
 use mimu_recording::error::Result;
 use nalgebra::{Matrix3, Matrix4};
 
-use crate::convention::{Bias, Convention, Shape, Triangle};
+use crate::convention::{Bias, Convention, Factors, Shape, Triangle};
+use crate::driver::Readings;
 use crate::intrinsics::Intrinsics;
 use crate::worst_axis::{Key, NoiseOptions, lines};
 use crate::{Export, Noise, Page, Sources, Target, driver, yaml};
@@ -52,11 +55,12 @@ impl Target for Kalibr {
     type Options = Options;
     const NAME: &str = "kalibr";
     const ABOUT: &str = "Noise and intrinsics for Kalibr: imu.yaml";
-    const CONTENTS: &str = "noise; with `--calibration` also the scale-misalignment intrinsics";
+    const CONTENTS: &str = "noise; with `--calibration` also the scale-misalignment intrinsics, with `--result` also imu1 and so on";
     const READERS: &str = "Kalibr; programs that read Kalibr's result";
     const CONVENTION: Convention =
         Convention::to_reading(Shape::TriangleRotation(Triangle::Lower), Bias::Absent);
     const NOISE: Noise = Noise::Needed;
+    const FURTHER_TRIADS: bool = true;
     const PAGES: &[Page] = &[Page::of("Kalibr", "imu.yaml")];
 
     /// # Errors
@@ -81,6 +85,8 @@ impl Target for Kalibr {
         if from.calibration.is_some() {
             write_intrinsics(&mut body, indent, &known, &mut export);
             known.describe(from, &mut export);
+            let r0 = known.factors.accel.rotation;
+            chain::write(&mut body, from, options, &r0, &mut export)?;
         }
         let head = export.head("#", from);
         Ok(export.with(head + &body))
@@ -95,6 +101,17 @@ pub(crate) const KEYS: [Key; 4] = [
     ("gyroscope_noise_density", "rad/s/sqrt(Hz)", Sensor::Gyro, Term::N),
     ("gyroscope_random_walk", "rad/s^2/sqrt(Hz)", Sensor::Gyro, Term::K),
 ];
+
+impl Kalibr {
+    /// M, and the rotation to the frame of the triad.
+    fn factors(readings: &Readings) -> Result<Factors> {
+        let parts = Self::CONVENTION.of(readings)?;
+        Ok(Factors {
+            triangle: parts.left,
+            rotation: parts.right,
+        })
+    }
+}
 
 fn write_intrinsics(out: &mut String, indent: &str, known: &Intrinsics, export: &mut Export) {
     let PerSensor { gyro, accel } = known.factors;

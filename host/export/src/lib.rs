@@ -9,6 +9,7 @@
 //! | [`format`](mod@format) | what a format declares, and the subcommands |
 //! | [`convention`] | how programs write the model of a triad: direction, factors, sign and place of the bias |
 //! | [`driver`] | readings in SI, as converted by a driver |
+//! | [`body`] | triads beyond the first gyro and accelerometer |
 //! | [`worst_axis`] | noise for programs that have one number for three axes |
 //! | [`intrinsics`] | triangular matrices and rotations, for Kalibr and OpenVINS |
 //! | [`remaining`] | errors that remain because a format cannot store a part of the calibration |
@@ -19,10 +20,12 @@
 //! | `flight_codes` | the accelerometer in whole codes, for Betaflight and INAV |
 //! | `template` | fixed text with places for values |
 
+pub mod adafruit;
 pub mod ardupilot;
 pub mod autoware;
 pub mod basalt;
 pub mod betaflight;
+pub mod body;
 pub mod c;
 pub mod convention;
 pub mod core;
@@ -93,6 +96,7 @@ pub static FORMATS: &[Format] = &[
     Format::of::<ardupilot::ArduPilot>(),
     Format::of::<betaflight::Betaflight>(),
     Format::of::<inav::Inav>(),
+    Format::of::<adafruit::Adafruit>(),
     Format::of::<slimenrf::SlimeNrf>(),
     Format::of::<pigeon::Pigeon>(),
     Format::of::<iio::Iio>(),
@@ -131,6 +135,8 @@ pub struct Export {
     pub content: Vec<u8>,
     #[serde(skip)]
     noise: Noise,
+    #[serde(skip)]
+    further_triads: bool,
 }
 
 impl Export {
@@ -141,11 +147,13 @@ impl Export {
             Noise::Optional | Noise::Needed => from.other_device(),
             Noise::No | Noise::Only => None,
         };
+        let without = calibration.filter(|_| !T::FURTHER_TRIADS);
+        let notes = notes.into_iter().chain(without.and_then(body::no_place));
         Self {
             format: "mimu-export/1",
             to: T::NAME,
             formulas: Vec::new(),
-            notes: notes.into_iter().collect(),
+            notes: notes.collect(),
             judgements: JudgedSource::all(from),
             calibration_errors: calibration.map(judged::errors_of).unwrap_or_default(),
             remaining: Vec::new(),
@@ -153,6 +161,7 @@ impl Export {
             cubics: Vec::new(),
             content: Vec::new(),
             noise: T::NOISE,
+            further_triads: T::FURTHER_TRIADS,
         }
     }
 

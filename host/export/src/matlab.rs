@@ -13,6 +13,7 @@
 
 use clap::Args;
 use mimu::quantity::Sensor;
+use mimu_recording::TriadKind;
 use mimu_recording::error::Result;
 use serde_json::{Value, json};
 
@@ -96,9 +97,9 @@ fn parameters(readings: &Readings, noise: Option<&[Densities; 3]>) -> Result<Val
     let parts = Matlab::CONVENTION.of(readings)?;
     let p = 100.0 * parts.left;
     let rows: Vec<[f64; 3]> = p.row_iter().map(|row| [row[0], row[1], row[2]]).collect();
-    let bias = match readings.sensor {
-        Sensor::Gyro => parts.bias,
-        Sensor::Accel => -parts.bias,
+    let bias = match readings.triad.kind {
+        TriadKind::Accel => -parts.bias,
+        _ => parts.bias,
     };
     let mut out = json!({"AxesMisalignment": rows, "ConstantBias": bias.as_slice()});
     if let Some(axes) = noise {

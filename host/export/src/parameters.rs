@@ -8,16 +8,17 @@ use std::fmt::Write as _;
 
 use clap::Args;
 use mimu::calibration::bias_cubic::{BiasCubics, Conversion};
+use mimu::calibration::body::BodyTriad;
 use mimu::quantity::{PerSensor, Sensor};
 use mimu::triad::Forward;
-use mimu_recording::RawUnit;
 use mimu_recording::error::{Argument, Result};
-use nalgebra::Vector3;
+use mimu_recording::{RawUnit, TriadKind, TriadName};
+use nalgebra::{Matrix3, Vector3};
 use serde::Serialize;
 
 use crate::convention::{Bias, Convention, Shape};
 use crate::remaining::{self, Places};
-use crate::{Export, Sources, driver, judged};
+use crate::{Export, Sources, body, driver, judged};
 
 /// The convention of both autopilots at one temperature; a gyro has no scale.
 pub(crate) const CONVENTION: Convention =
@@ -84,6 +85,33 @@ pub struct Options {
     /// The driver's conversion.
     #[command(flatten)]
     pub driver: driver::Options,
+    /// That of magnetometers.
+    #[command(flatten)]
+    pub mag: body::Options,
+}
+
+/// What an autopilot takes of magnetometers.
+pub(crate) struct Compass {
+    /// Unit of its readings, and how many of it are a microtesla.
+    pub unit: (&'static str, f64),
+    /// Sign of the offset; the matrix is symmetric.
+    pub convention: Convention,
+    /// Its formula of v, offset and a matrix S.
+    pub formula: &'static str,
+    /// Where the six numbers of S are.
+    pub symmetric: &'static str,
+}
+
+/// A further triad in the autopilot.
+pub(crate) struct FurtherTriad {
+    /// The triad.
+    pub triad: TriadName,
+    /// Its number in the autopilot, from 1.
+    pub instance: u8,
+    /// Offset of the readings, in the unit of the autopilot.
+    pub offset: Vector3<f64>,
+    /// Factors of an accelerometer's axes on the diagonal; the symmetric matrix of a magnetometer.
+    pub scale: Matrix3<f64>,
 }
 
 /// A triad, and the offset and factor of each of its axes, SI and SI per SI of the reading.
@@ -185,6 +213,70 @@ impl Options {
             all.push((sensor, conversion.bias(&forward), gain.map(f64::recip)));
         }
         Ok(all)
+    }
+}
+
+impl Options {
+    /// The further triads that an autopilot with `most` of each kind takes; adds formulas and notes.
+    ///
+    /// # Errors
+    /// A magnetometer's field has no known size, its axes are mirrored, or C is singular.
+    pub(crate) fn further(
+        &self,
+        from: &Sources,
+        compass: &Compass,
+        most: u8,
+        export: &mut Export,
+    ) -> Result<Vec<FurtherTriad>> {
+        let Some((calibration, place)) = from.calibration else {
+            return Ok(Vec::new());
+        };
+        let instance = |name: TriadName| match name.kind {
+            TriadKind::Mag => name.number,
+            _ => self.imu.saturating_add(name.number - 1),
+        };
+        let has = |name: TriadName| instance(name) <= most;
+        export.notes.extend(body::left_out(calibration, has));
+        let mut all = Vec::new();
+        for triad in calibration.body.iter().filter(|triad| has(triad.triad)) {
+            let (offset, scale) = match triad.triad.kind {
+                TriadKind::Mag => self.compass(triad, place, compass, export)?,
+                _ => {
+                    let readings = body::readings(triad, true, None, place)?;
+                    body::note_driver(&readings, triad, false, export);
+                    let scales = triad.triad.kind == TriadKind::Accel;
+                    body::note_axes(&readings, scales, export);
+                    let parts = CONVENTION.of(&readings)?;
+                    (parts.bias, parts.left)
+                }
+            };
+            all.push(FurtherTriad {
+                triad: triad.triad,
+                instance: instance(triad.triad),
+                offset,
+                scale,
+            });
+        }
+        Ok(all)
+    }
+
+    fn compass(
+        &self,
+        mag: &BodyTriad,
+        place: &str,
+        compass: &Compass,
+        export: &mut Export,
+    ) -> Result<(Vector3<f64>, Matrix3<f64>)> {
+        let (unit, per_ut) = compass.unit;
+        let readings = self.mag.microtesla(mag, place)?;
+        export.formula(format!(
+            "{}: x = {} in {unit}, {}; v is the driver's output, {per_ut} {unit} for a microtesla of the readings below",
+            mag.triad, compass.formula, compass.symmetric
+        ));
+        body::note_driver(&readings, mag, self.mag.mag_ut_per_raw.is_some(), export);
+        let parts = compass.convention.of(&readings)?;
+        body::note_rotation(mag, &parts.left, place, export)?;
+        Ok((per_ut * parts.bias, parts.right))
     }
 }
 

@@ -7,18 +7,32 @@
 //! A calibration at one temperature becomes CAL_ACCn_XOFF, CAL_ACCn_XSCALE and CAL_GYROn_XOFF, n from 0. PX4 computes `(data - thermal_offset -
 //! offset) * scale` for an accelerometer and `data - thermal_offset - offset` for a gyro, which has no scale there. Source:
 //! src/lib/sensor_calibration/Accelerometer.hpp and Gyroscope.hpp, `Correct`; src/modules/sensors/module.yaml.
+//!
+//! A magnetometer becomes CAL_MAGn_XOFF, in gauss, and the symmetric matrix of CAL_MAGn_XSCALE and CAL_MAGn_XODIAG: `rotation * (scale * (data - offset))`.
+//! The rotation is the mounting (CAL_MAGn_ROT; as Euler angles, CAL_MAGn_ROLL and so on). Source: src/lib/sensor_calibration/Magnetometer.hpp, `Correct`;
+//! Magnetometer.cpp, `set_offdiagonal` (XODIAG in row 1, column 2; YODIAG in row 1, column 3; ZODIAG in row 2, column 3); msg/SensorMag.msg for the unit.
 
 use mimu::calibration::bias_cubic::BiasCubics;
 use mimu::quantity::Sensor;
-use mimu_recording::error::Result;
+use mimu_recording::TriadKind;
+use mimu_recording::error::{Argument, Result};
 
-use crate::convention::{Convention, within};
-use crate::parameters::{CONVENTION, GIVE_FACTOR, LETTERS, Options, Parameter};
+use crate::convention::{Bias, Convention, Shape, within};
+use crate::parameters::{CONVENTION, Compass, GIVE_FACTOR, LETTERS, Options, Parameter};
 use crate::remaining::Remaining;
 use crate::{Export, Page, Sources, Target};
 
-/// Range of PX4's scale factors of an accelerometer.
+/// Range of PX4's scale factors of an accelerometer and of a magnetometer.
 const SCALES: [f64; 2] = [0.1, 3.0];
+/// Sensors of a kind.
+const MOST: u8 = 4;
+/// Its magnetometers.
+const COMPASS: Compass = Compass {
+    unit: ("gauss", 0.01),
+    convention: Convention::to_input(Shape::RotationSymmetric, Bias::SubtractedFromReadings),
+    formula: "S (v - offset)",
+    symmetric: "S = [[XSCALE, XODIAG, YODIAG], [XODIAG, YSCALE, ZODIAG], [YODIAG, ZODIAG, ZSCALE]]",
+};
 
 /// The format.
 pub struct Px4;
@@ -27,18 +41,18 @@ impl Target for Px4 {
     type Options = Options;
     const NAME: &str = "px4";
     const ABOUT: &str = "Parameters of PX4: TC_* over temperature, CAL_* at one";
-    const CONTENTS: &str =
-        "biases over temperature, or biases and scale factors at one temperature";
+    const CONTENTS: &str = "biases over temperature, or biases and scale factors at one temperature; magnetometers, further units";
     const READERS: &str = "PX4";
     const CONVENTION: Convention = CONVENTION;
     const TAKES_BIASES: bool = true;
+    const FURTHER_TRIADS: bool = true;
     const PAGES: &[Page] = &[Page {
         options: "--qgc",
         ..Page::of("PX4, for QGroundControl", "px4.params")
     }];
 
     /// # Errors
-    /// The calibration is missing, a scale factor exceeds PX4's range, or an error of [`BiasCubics::of`], [`BiasCubics::of_rest`] or `Conversion::of`.
+    /// The calibration is missing, a scale factor exceeds PX4's range, an error of `Options::further`, or an error of [`BiasCubics::of`], [`BiasCubics::of_rest`] or `Conversion::of`.
     fn export(from: &Sources, options: &Options) -> Result<Export> {
         let n = options.imu - 1;
         let mut export = Export::new::<Self>(from);
@@ -64,6 +78,7 @@ impl Target for Px4 {
             Some(range_c) => over_temperature(options, from, range_c, &mut export)?,
             None => at_one_temperature(options, from, &mut export)?,
         }
+        further(options, from, &mut export)?;
         if !options.qgc {
             export.note("MAVProxy's `param load` skips changes of less than 1e-6, such as X2 and X3: load this file with another program, or write it for QGroundControl.");
         }
@@ -122,6 +137,52 @@ fn at_one_temperature(options: &Options, from: &Sources, export: &mut Export) ->
             within((sensor, i), &name, (scale[i], 3, ""), SCALES, GIVE_FACTOR)?;
             out.push(Parameter::real(name, scale[i]));
         }
+    }
+    Ok(())
+}
+
+/// Each further triad as the sensor with its number.
+fn further(options: &Options, from: &Sources, export: &mut Export) -> Result<()> {
+    let all = options.further(from, &COMPASS, MOST, export)?;
+    let mut ids = Vec::new();
+    for of in all {
+        let stem = match of.triad.kind {
+            TriadKind::Gyro => "CAL_GYRO",
+            TriadKind::Accel => "CAL_ACC",
+            TriadKind::Mag => "CAL_MAG",
+        };
+        let prefix = format!("{stem}{}", of.instance - 1);
+        ids.push(format!("{prefix}_ID"));
+        let axes = || LETTERS.iter().enumerate();
+        let real = |what: &str, letter: &str, value| {
+            Parameter::real(format!("{prefix}_{letter}{what}"), value)
+        };
+        let out = &mut export.parameters;
+        out.extend(axes().map(|(i, letter)| real("OFF", letter, of.offset[i])));
+        if of.triad.kind == TriadKind::Gyro {
+            continue;
+        }
+        let remedy = match of.triad.kind {
+            TriadKind::Mag => (GIVE_FACTOR.0, Argument::MagConversion),
+            _ => GIVE_FACTOR,
+        };
+        for (i, letter) in axes() {
+            let (name, scale) = (format!("{prefix}_{letter}SCALE"), of.scale[(i, i)]);
+            within((of.triad, i), &name, (scale, 3, ""), SCALES, remedy)?;
+            out.push(Parameter::real(name, scale));
+        }
+        if of.triad.kind == TriadKind::Mag {
+            let off = [of.scale[(0, 1)], of.scale[(0, 2)], of.scale[(1, 2)]];
+            out.extend(axes().map(|(i, letter)| real("ODIAG", letter, off[i])));
+            export.note(format!(
+                "{}: for an external compass, {prefix}_ROT 100 with {prefix}_ROLL, _PITCH and _YAW sets such a mounting.",
+                of.triad
+            ));
+        }
+    }
+    if !ids.is_empty() {
+        let ids = ids.join(", ");
+        export.note(format!("Set {ids} to the sensors' device ids if PX4 has not set them: it finds a calibration by its id only."));
     }
     Ok(())
 }

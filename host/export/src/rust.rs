@@ -6,6 +6,7 @@
 //! a change of the calibration is visible as a change of its numbers. Every `f32` is written as the shortest decimal number that equals it, so that
 //! results match the device's to the last bit.
 
+use mimu::calibration::body::BodyTriad;
 use mimu::calibration::reference_node;
 use mimu::quantity::Sensor;
 use mimu_core::compensation::{Affine, Compensation};
@@ -30,6 +31,7 @@ impl Target for Rust {
     const ABOUT: &str = "Constants and a function for Rust programs with mimu-core";
     const CONTENTS: &str = "everything, as constants";
     const READERS: &str = "Rust programs with `mimu-core`";
+    const FURTHER_TRIADS: bool = true;
     const PAGES: &[Page] = &[Page::of("Rust with mimu-core", "calibration.rs")];
 
     /// # Errors
@@ -69,9 +71,34 @@ impl Target for Rust {
             "from_c": format!("{from_c:?}"),
             "to_c": format!("{to_c:?}"),
             "lags": lags.unwrap_or("None".into()),
+            "body": calibration.body.iter().map(further).collect::<Value>(),
+            "triads": calibration.body.len(),
         });
         Ok(export.with(fill(include_str!("calibration.rs.in"), &values)))
     }
+}
+
+/// A further triad, in the frame of its reference.
+fn further(triad: &BodyTriad) -> Value {
+    let model = triad.in_reference();
+    let single = Affine {
+        matrix: model.matrix.map(|v| v as f32),
+        offset: model.offset.map(|v| v as f32),
+    };
+    let rotation = triad.rotation().map(|r| rows(&r.map(|v| v as f32)));
+    let delay_s = triad.delay_ms.map(|ms| (1e-3 * ms) as f32);
+    let arm_m = triad.lever_arm_mm;
+    let arm_m = arm_m.map(|mm| list(&mm.map(|mm| (1e-3 * mm) as f32)));
+    let option = |text: Option<String>| text.map_or("None".into(), |text| format!("Some({text})"));
+    json!({
+        "name": triad.triad.to_string(),
+        "reference": triad.reference.to_string(),
+        "unit": triad.unit,
+        "model": triad_of(&single),
+        "rotation": option(rotation),
+        "delay_s": format!("{delay_s:?}"),
+        "lever_arm_m": option(arm_m),
+    })
 }
 
 fn node(node: &Node<f32>) -> Value {
@@ -114,8 +141,11 @@ fn effect(effect: &DeviceEffect<f32>) -> Value {
 }
 
 fn triads(of: &Compensation<f32>) -> String {
-    let one = |a: &Affine<f32>| format!("({}, {})", rows(&a.matrix), list(a.offset.as_slice()));
-    format!("[{}, {}]", one(&of.gyro), one(&of.accel))
+    format!("[{}, {}]", triad_of(&of.gyro), triad_of(&of.accel))
+}
+
+fn triad_of(of: &Affine<f32>) -> String {
+    format!("({}, {})", rows(&of.matrix), list(of.offset.as_slice()))
 }
 
 fn rows(matrix: &Matrix3<f32>) -> String {

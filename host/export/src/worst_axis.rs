@@ -103,6 +103,38 @@ impl WalkOptions {
         Ok(PerSensor { gyro, accel })
     }
 
+    /// Those of the further unit with this number; `None` if the file has no channel of it.
+    ///
+    /// # Errors
+    /// As for [`Self::densities`].
+    pub(crate) fn of_unit(
+        &self,
+        noise: &NoiseFile,
+        number: u8,
+        gain: &PerSensor<[f64; 3]>,
+    ) -> Result<Option<PerSensor<Densities>>> {
+        let of = |sensor: Sensor| {
+            let name = format!("{sensor}{number}");
+            let names = AXES.map(|axis| format!("{name}_{axis}"));
+            let channels = noise.channel.iter().filter(|c| names.contains(&c.name));
+            let channels: Vec<&NoiseChannel> = channels.collect();
+            self.of(
+                noise,
+                sensor,
+                &channels,
+                &format!("the {name}"),
+                &gain[sensor],
+            )
+        };
+        let stems = Sensor::BOTH.map(|sensor| format!("{sensor}{number}_"));
+        let known = |stem: &String| noise.channel.iter().any(|c| c.name.starts_with(stem));
+        if !stems.iter().any(known) {
+            return Ok(None);
+        }
+        let [accel, gyro] = [of(Sensor::Accel)?, of(Sensor::Gyro)?];
+        Ok(Some(PerSensor { gyro, accel }))
+    }
+
     /// N and K of every axis, times `gain` of the axis, for programs that have a number for each.
     ///
     /// # Errors

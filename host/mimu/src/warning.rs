@@ -9,7 +9,7 @@ use std::mem::discriminant;
 
 use mimu_recording::error::Error;
 use mimu_recording::health::Finding;
-use mimu_recording::{ClockRate, RAW_COLUMNS, RawUnit};
+use mimu_recording::{ClockRate, RAW_COLUMNS, RawUnit, TriadName};
 use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
 
@@ -488,6 +488,9 @@ pub enum Warning {
     /// A calibration that lacks a sensor of the recording.
     #[error("the calibration is not for the {sensor}: its columns are left out")]
     NotCalibrated { sensor: Sensor },
+    /// A calibration that lacks a further triad of the recording.
+    #[error("the calibration is not for {triad}: its columns are left out")]
+    TriadNotCalibrated { triad: TriadName },
     /// A calibration whose uncertainty is not known.
     #[error(
         "the calibration has no uncertainty, like one that was read from a device. Its matrix is taken as exact: an error of it may be found as an effect, and the intervals of a new calibration do not include it"

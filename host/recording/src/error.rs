@@ -117,6 +117,7 @@ arguments! {
     AccelConversion, "--accel-si-per-raw", "The same for an accelerometer.";
     GyroZero, "--gyro-zero", "Raw reading that a driver converts to a rate of 0.";
     AccelZero, "--accel-zero", "Raw reading that a driver converts to a force of 0.";
+    MagConversion, "--mag-ut-per-raw", "µT per raw unit by which a driver converts a magnetometer's readings.";
     Prefix, "--prefix", "Beginning of the names in a source file.";
 }
 

@@ -64,9 +64,9 @@ pub use growing::Growing;
 pub use import::{
     BrokenKind, BrokenLimit, BrokenRows, Chosen, ColumnList, CommentSigns, CopiedTable, Decimal,
     Face, ImportOptions, ImportSummary, Inputs, Instance, Jitter, LogOptions, Offset, PerColumn,
-    PoseMean, PoseMeans, Preset, PresetUse, Preview, ReadingUnits, Role, Rounds, RowFilter,
-    RowRange, Scale, SkippedLines, TimeSummary, TwosComplement, Zero, import, is_log, labelled,
-    log_formats, look, preview,
+    PoseMean, PoseMeans, Preset, PresetUse, Preview, ReadingUnits, ReplacedTriad, Role, Rounds,
+    RowFilter, RowRange, Scale, SkippedLines, TimeSummary, TwosComplement, Zero, import, is_log,
+    labelled, log_formats, look, preview,
 };
 pub use in_memory::{InMemory, usual_rate_hz};
 pub use manifest::{Format, MANIFEST_FILE, Manifest, Source};

@@ -6,7 +6,7 @@ use clap::Args;
 use mimu::calibration::Calibration;
 use mimu::calibration::apply::{Applied, Compensated, apply};
 use mimu_recording::error::{Argument, Error, Result};
-use mimu_recording::{CopiedTable, MANIFEST_FILE, Recording, SampleFormat};
+use mimu_recording::{CopiedTable, MANIFEST_FILE, Recording, ReplacedTriad, SampleFormat};
 
 use crate::arguments::JsonArgs;
 use crate::hint::OF_A_LOG;
@@ -27,7 +27,7 @@ pub(crate) struct ApplyArgs {
     /// Replace an existing recording
     #[arg(long)]
     replace: bool,
-    /// Directory of the compensated recording; for a log of text also a CSV file: a copy of its rows with compensated readings
+    /// Directory of the compensated recording, in which further triads are rotated into the frame of their reference and keep their times; for a log of text also a CSV file: a copy of its rows with compensated readings
     #[arg(short, value_name = "DIR|FILE.csv")]
     output: PathBuf,
     #[command(flatten)]
@@ -90,17 +90,21 @@ fn copied(args: &ApplyArgs, calibration: &Calibration) -> Result<Applied> {
     let bar = progress("compensating");
     let mut compensated =
         Compensated::new(&recording, calibration, |share| bar.reach(0.5 * share))?;
-    let sensors = compensated.sensors();
-    let mut copy = CopiedTable::open(&options, [sensors.gyro, sensors.accel])?;
+    let replaced = compensated.units().map(|(triad, unit)| ReplacedTriad {
+        triad,
+        unit: unit.to_owned(),
+    });
+    let mut copy = CopiedTable::open(&options, replaced.collect())?;
     let mut rows = 0;
     compensated.for_each(
         |share| bar.reach(0.5 + 0.5 * share),
         |_, clean| {
             rows += clean.len() as u64;
             (0..clean.len()).try_for_each(|k| {
-                copy.row(std::array::from_fn(|c| {
-                    clean.raw[c].get(k).copied().unwrap_or(f64::NAN)
-                }))
+                copy.row(|column| {
+                    let cell = clean.values(column).and_then(|values| values.get(k));
+                    cell.copied().unwrap_or(f64::NAN)
+                })
             })
         },
     )?;

@@ -24,6 +24,15 @@ pub fn apply_text(applied: &Applied) -> String {
                 }
             }
         }
+        section {
+            @for of in &applied.body {
+                p {
+                    (of.triad) ": in " (of.unit) ", "
+                    @if let Some(frame) = of.frame { "in the frame of " (frame) } @else { "in its own frame" }
+                    @if of.empty > 0 { "; " (plural(of.empty, "sample")) " without a reading, left empty" }
+                }
+            }
+        }
         (all_warnings(&applied.warnings))
     })
 }

@@ -78,6 +78,10 @@ pub fn of_calibration(calibration: &Calibration) -> String {
     fragment(&html! {
         h1 { "Calibration of " (calibration.device) }
         (unit::model::section(calibration))
+        @if !calibration.body.is_empty() {
+            h2 { "Body" }
+            (unit::body::section(calibration))
+        }
         @if calibration.temperature.is_some() {
             h2 { "Over temperature" }
             (unit::curves::section(calibration))

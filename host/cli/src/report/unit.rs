@@ -1,5 +1,6 @@
 //! The page of a unit: all results, in the order of a calibration certificate.
 
+pub(super) mod body;
 pub(super) mod curves;
 pub(super) mod model;
 pub(super) mod noise;
@@ -55,6 +56,7 @@ pub fn unit_page(unit: &UnitReport, made: &Made) -> String {
             ("errors", "Error before and after", found.is_some() || !unit.verified.is_empty()),
             ("temperature", "Over temperature", calibration.temperature.is_some()),
             ("calibration", "Calibration", true),
+            ("body", "Body", !calibration.body.is_empty()),
             ("data-sheet", "Against the data sheet", unit.data_sheet.is_some()),
             ("effects", "Effects and residuals", found.is_some()),
             ("recordings", "Recordings", found.is_some()),
@@ -71,6 +73,7 @@ pub fn unit_page(unit: &UnitReport, made: &Made) -> String {
         h2 id="calibration" { "Calibration" }
         @if let Some(file) = unit.calibration_file { p { "From " code { (file) } "." } }
         (model::section(calibration))
+        @if !calibration.body.is_empty() { h2 id="body" { "Body" } (body::section(calibration)) }
         @if let Some(sheet) = unit.data_sheet { h2 id="data-sheet" { "Against the data sheet" } (data_sheet::section(sheet)) }
         @if let Some(found) = found {
             h2 id="effects" { "Effects and residuals" }

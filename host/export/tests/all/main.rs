@@ -1,5 +1,6 @@
 //! Exports whose truth is the compiler, the device, or a published file.
 
+mod body;
 mod judged;
 mod lists;
 mod noise_of_one_axis;

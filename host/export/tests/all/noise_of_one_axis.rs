@@ -48,9 +48,8 @@ fn channel(k: usize) -> NoiseChannel {
     }
 }
 
-#[test]
-fn the_interval_beside_a_figure_is_in_the_unit_of_the_figure() {
-    let noise = NoiseFile {
+pub fn noise() -> NoiseFile {
+    NoiseFile {
         format: NOISE_FORMAT.into(),
         device: "unit".into(),
         created: None,
@@ -60,7 +59,12 @@ fn the_interval_beside_a_figure_is_in_the_unit_of_the_figure() {
         confidence: 0.95,
         channel: (0..6).map(channel).collect(),
         place: "noise.toml".into(),
-    };
+    }
+}
+
+#[test]
+fn the_interval_beside_a_figure_is_in_the_unit_of_the_figure() {
+    let noise = noise();
     let from = Sources {
         noise: Some(&noise),
         ..Sources::default()

@@ -1,6 +1,7 @@
 //! A recording compensated by a calibration, sample by sample.
 //!
-//! It uses the compensator of `core`, in double precision, so it writes what the device streams.
+//! It uses the compensator of `core`, in double precision, so it writes what the device streams. Further triads of a body get C and o, and are rotated into
+//! the frame of their reference. Their times stay: a delay is not taken out, and no lever arm.
 
 use std::path::Path;
 
@@ -20,7 +21,9 @@ use crate::signal::blocks::{Condensed, Rails};
 use crate::signal::rails::find;
 use crate::warning::Warning;
 use mimu_recording::error::{Error, Result};
-use mimu_recording::{Batch, Columns, Manifest, RawUnit, Recording, SampleFormat, Source, Writer};
+use mimu_recording::{
+    Batch, Column, Columns, Manifest, RawUnit, Recording, SampleFormat, Source, TriadName, Writer,
+};
 
 /// Room for effects of a triad, more than any calibration has.
 const ROOM: usize = 32;
@@ -41,6 +44,9 @@ pub struct Applied {
     /// Sensors that were compensated.
     #[serde(serialize_with = "present")]
     pub sensors: PerSensor<Option<AppliedSensor>>,
+    /// Further triads that were compensated.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub body: Vec<AppliedTriad>,
     /// Gaps, which are kept as they are.
     pub gaps: u64,
     /// Time missing in them, s.
@@ -60,7 +66,20 @@ pub struct AppliedSensor {
     pub clipped: u64,
 }
 
-/// Writes `recording`, compensated by `calibration`, to `out`: rad/s and m/s². Known inputs are kept.
+/// A further triad of a body in the compensated recording.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct AppliedTriad {
+    /// Its name.
+    pub triad: TriadName,
+    /// Unit of its columns.
+    pub unit: String,
+    /// The triad in whose frame its columns are; null for its own frame, if its rotation is not known.
+    pub frame: Option<TriadName>,
+    /// Samples that are empty because an axis has no reading.
+    pub empty: u64,
+}
+
+/// Writes `recording`, compensated by `calibration`, to `out`: rad/s and m/s², magnetometers in the unit of their calibration. Known inputs are kept.
 ///
 /// ```no_run
 /// use mimu::{Calibration, Recording, SampleFormat, apply};
@@ -125,9 +144,11 @@ impl<'a> Compensated<'a> {
         let mut warnings: Vec<Warning> = check_unit(calibration, manifest, &place)?
             .into_iter()
             .collect();
+        let body = further(recording, calibration, &mut warnings)?;
         let columns = Columns {
             gyro: recording.columns.gyro && calibration.gyro.is_some(),
             accel: recording.columns.accel && calibration.accel.is_some(),
+            more: body.iter().map(|(_, applied)| applied.triad).collect(),
             ..recording.columns
         };
         let has = PerSensor {
@@ -155,7 +176,7 @@ impl<'a> Compensated<'a> {
         let condensed = Condensed::read(recording, false, progress)?;
         warnings.extend(condensed.warnings.iter().cloned());
         warnings.extend(outside(calibration, &condensed.blocks));
-        let batches = Batches::new(
+        let mut batches = Batches::new(
             calibration,
             &condensed,
             manifest,
@@ -163,6 +184,7 @@ impl<'a> Compensated<'a> {
             &place,
             &mut warnings,
         )?;
+        batches.body = body;
         Ok(Self {
             recording,
             columns,
@@ -176,12 +198,14 @@ impl<'a> Compensated<'a> {
     /// The result, after `rows` were written to `out`.
     pub fn into_applied(self, out: &Path, rows: u64) -> Applied {
         let (counts, has) = (self.batches.counts, self.batches.has);
+        let body = self.batches.body.into_iter();
         Applied {
             format: "mimu-apply/1",
             recording: out.display().to_string(),
             judgement: self.judgement,
             rows,
             sensors: PerSensor::from_fn(|sensor| has[sensor].then_some(counts[sensor])),
+            body: body.map(|(_, applied)| applied).collect(),
             gaps: self.condensed.gaps.0,
             missing_s: self.condensed.gaps.1,
             effects: self.batches.ids,
@@ -189,9 +213,16 @@ impl<'a> Compensated<'a> {
         }
     }
 
-    /// Which sensors it compensates.
-    pub fn sensors(&self) -> PerSensor<bool> {
-        self.batches.has
+    /// The triads that it compensates, and the units of their columns.
+    pub fn units(&self) -> impl Iterator<Item = (TriadName, &str)> {
+        let first = [
+            (TriadName::GYRO, Sensor::Gyro),
+            (TriadName::ACCEL, Sensor::Accel),
+        ];
+        let first = first.into_iter().filter(|(_, s)| self.batches.has[*s]);
+        let further = self.batches.body.iter();
+        let further = further.map(|(_, of)| (of.triad, of.unit.as_str()));
+        first.map(|(triad, s)| (triad, s.unit())).chain(further)
     }
 
     /// What a person should know.
@@ -212,6 +243,57 @@ impl<'a> Compensated<'a> {
         let each = |batch: &Batch| consume(batch, &batches.batch(batch));
         self.recording.for_each_batch(progress, each)?;
         Ok(())
+    }
+}
+
+/// The models of the further triads, into the frame of their reference. A triad that the calibration lacks is left out, with a warning.
+fn further(
+    recording: &Recording,
+    calibration: &Calibration,
+    warnings: &mut Vec<Warning>,
+) -> Result<Vec<(Affine<f64>, AppliedTriad)>> {
+    let mut all = Vec::new();
+    for name in recording.columns.more.iter() {
+        let Some(triad) = calibration.body.iter().find(|of| of.triad == name) else {
+            warnings.push(Warning::TriadNotCalibrated { triad: name });
+            continue;
+        };
+        let (ours, theirs) = (triad.raw_unit, recording.manifest.raw_unit);
+        if ours != theirs {
+            let problem = format!(
+                "its readings of {name} are in {theirs}, and the calibration is for readings in {ours}"
+            );
+            let remedy = "use a calibration of such readings";
+            return Err(Error::new(&recording.place, problem, remedy));
+        }
+        let applied = AppliedTriad {
+            triad: name,
+            unit: triad.unit.clone(),
+            frame: triad.rotation_deg.map(|_| triad.reference),
+            empty: 0,
+        };
+        all.push((triad.in_reference(), applied));
+    }
+    Ok(all)
+}
+
+/// Compensates a further triad in `out`, a copy of the raw samples.
+fn compensate(model: &Affine<f64>, of: &mut AppliedTriad, out: &mut Batch) {
+    let columns = [0, 1, 2].map(|axis| Column::of(of.triad, axis));
+    for row in 0..out.len() {
+        let cell = |axis: usize| out.values(columns[axis]).and_then(|v| v.get(row));
+        let raw = Vector3::from_fn(|axis, _| cell(axis).copied().unwrap_or(f64::NAN));
+        let whole = raw.iter().all(|u| u.is_finite());
+        of.empty += u64::from(!whole);
+        let input = match whole {
+            true => model.apply(&raw),
+            false => Vector3::repeat(f64::NAN),
+        };
+        for (axis, column) in columns.iter().enumerate() {
+            if let Some(cell) = out.values_mut(*column).and_then(|v| v.get_mut(row)) {
+                *cell = input[axis];
+            }
+        }
     }
 }
 
@@ -254,6 +336,8 @@ struct Batches {
     /// Last whole reading of each triad. The other triad's effects depend on it while this triad has none.
     held: Sample<f64>,
     counts: PerSensor<AppliedSensor>,
+    /// Further triads with their models.
+    body: Vec<(Affine<f64>, AppliedTriad)>,
 }
 
 impl Batches {
@@ -332,6 +416,7 @@ impl Batches {
             last_s: first_s,
             held: Sample::from_fn(|s| Vector3::from_fn(|i, _| first(s.channels().start + i))),
             counts: Default::default(),
+            body: Vec::new(),
         })
     }
 
@@ -341,6 +426,11 @@ impl Batches {
             if !self.has[sensor] {
                 sensor.channels().for_each(|c| out.raw[c].clear());
             }
+        }
+        let kept = |triad| self.body.iter().any(|(_, of)| of.triad == triad);
+        out.more.retain(|(triad, _)| kept(*triad));
+        for (model, of) in &mut self.body {
+            compensate(model, of, &mut out);
         }
         for row in 0..batch.len() {
             let t_s = batch.t_s[row];

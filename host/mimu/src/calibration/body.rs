@@ -1,6 +1,8 @@
 //! The further triads of a body in a calibration file: each with its C and o as the first two, and how it stands to a reference triad.
 
+use mimu_core::compensation::Affine;
 use mimu_recording::{RawUnit, TriadName};
+use nalgebra::{Matrix3, Rotation3, Vector3};
 use serde::{Deserialize, Serialize};
 
 /// A triad of a body beyond the first gyro and accelerometer.
@@ -54,4 +56,54 @@ pub struct BodyTriad {
     /// Halves of its 95 % intervals.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub interval_lever_arm_mm: Option<[f64; 3]>,
+}
+
+impl BodyTriad {
+    /// `x = C u + o`, raw to its [unit](Self::unit), in its own frame.
+    pub fn model(&self) -> Affine<f64> {
+        Affine {
+            matrix: Matrix3::from_fn(|i, j| self.C[i][j]),
+            offset: self.o.into(),
+        }
+    }
+
+    /// R of `R x`: from its own frame to that of the reference.
+    pub fn rotation(&self) -> Option<Matrix3<f64>> {
+        let vector = Vector3::from(self.rotation_deg?).map(f64::to_radians);
+        Some(Rotation3::new(vector).into_inner())
+    }
+
+    /// `R (C u + o)`, in the frame of the reference; in its own frame if the rotation is not known.
+    pub fn in_reference(&self) -> Affine<f64> {
+        let Affine { matrix, offset } = self.model();
+        let rotation = self.rotation().unwrap_or_else(Matrix3::identity);
+        Affine {
+            matrix: rotation * matrix,
+            offset: rotation * offset,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mimu_recording::parse_toml;
+
+    /// A second gyro whose own x looks along the body's y: turned by 90 degrees about z.
+    #[test]
+    fn a_triad_turned_about_z_reads_its_x_along_the_bodys_y() {
+        let triad: BodyTriad = parse_toml(
+            "triad = \"gyro2\"\nreference = \"gyro\"\nformula = \"x = C u + o\"\ndirection = \"raw to SI\"\nraw_unit = \"count\"\nunit = \"rad/s\"\n\
+             C = [[0.5, 0.0, 0.0], [0.0, 0.5, 0.0], [0.0, 0.0, 0.5]]\no = [1.0, 0.0, 0.0]\n\
+             sigma_C = [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]\nsigma_o = [0.0, 0.0, 0.0]\n\
+             interval_C = [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]\ninterval_o = [0.0, 0.0, 0.0]\nrotation_deg = [0.0, 0.0, 90.0]\n",
+            "test",
+            None,
+        )
+        .unwrap();
+        let raw = Vector3::new(4.0, 0.0, 6.0);
+        assert_eq!(triad.model().apply(&raw), Vector3::new(3.0, 0.0, 3.0));
+        let turned = triad.in_reference().apply(&raw);
+        assert!((turned - Vector3::new(0.0, 3.0, 3.0)).amax() < 1e-12);
+    }
 }

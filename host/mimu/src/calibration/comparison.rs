@@ -8,12 +8,13 @@ use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::Calibration;
+use super::body::BodyTriad;
 use crate::judgement::Judgement;
 use crate::quantity::{AXES, Sensor};
 use crate::triad::Forward;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::statistics::mean_and_variance;
-use mimu_recording::{RawUnit, are_two_units};
+use mimu_recording::{NORMAL_95, RawUnit, TriadName, are_two_units};
 
 /// Probability that any parameter is named as changed although none has changed.
 const FALSE_CHANGE: f64 = 0.05;
@@ -37,8 +38,8 @@ pub struct Comparison {
 /// One parameter in all files.
 #[derive(Debug, Clone, Serialize)]
 pub struct ComparedParameter {
-    /// The sensor.
-    pub sensor: Sensor,
+    /// The triad.
+    pub sensor: TriadName,
     /// `scale factor x`, or a coefficient of an effect.
     pub name: String,
     /// Unit of all the numbers.
@@ -60,7 +61,7 @@ pub struct ComparedParameter {
 }
 
 /// A value and its standard deviation, by sensor, name and unit.
-type Named = (Sensor, String, String, f64, Option<f64>);
+type Named = (TriadName, String, String, f64, Option<f64>);
 
 /// Compares calibrations, each given with its file.
 ///
@@ -150,7 +151,7 @@ fn too_few() -> Error {
 }
 
 impl ComparedParameter {
-    fn new(sensor: Sensor, name: &str, unit: &str, found: &[(f64, Option<f64>)]) -> Self {
+    fn new(sensor: TriadName, name: &str, unit: &str, found: &[(f64, Option<f64>)]) -> Self {
         let values: Vec<f64> = found.iter().map(|f| f.0).collect();
         let n = values.len() as f64;
         let (mean, variance) = mean_and_variance(values.iter().copied());
@@ -190,6 +191,13 @@ impl ComparedParameter {
 }
 
 impl ComparedParameter {
+    /// The sensor, if it is the first gyro or the first accelerometer.
+    pub fn of_first(&self) -> Option<Sensor> {
+        Sensor::BOTH
+            .into_iter()
+            .find(|s| name_of(*s) == self.sensor)
+    }
+
     /// Of two files, the second value minus the first, and the half-width of its 95 % interval if it is known. `None` for more files.
     pub fn difference(&self) -> Option<(f64, Option<f64>)> {
         let &[first, second] = self.values.as_slice() else {
@@ -295,7 +303,7 @@ fn parameters(calibration: &Calibration, temperatures: &[f64]) -> Vec<Named> {
             for i in 0..3 {
                 let name = format!("{kind} {}", names[i]);
                 let sigma = sigmas.map(|s| s[i]);
-                all.push((sensor, name, unit.clone(), values[i], sigma));
+                all.push((name_of(sensor), name, unit.clone(), values[i], sigma));
             }
         }
         for temp_c in temperatures {
@@ -308,16 +316,64 @@ fn parameters(calibration: &Calibration, temperatures: &[f64]) -> Vec<Named> {
                 for (i, axis) in AXES.iter().enumerate() {
                     let name = format!("{kind} {axis} at {temp_c:.1} °C");
                     let sigma = sigmas.map(|s| s[i]);
-                    all.push((sensor, name, unit.clone(), values[i], sigma));
+                    all.push((name_of(sensor), name, unit.clone(), values[i], sigma));
                 }
             }
         }
     }
+    all.extend(calibration.body.iter().flat_map(of_body));
     for effect in calibration.effects() {
         for c in effect.coefficients() {
             let name = format!("{} {}", effect.id(), c.name);
-            all.push((effect.sensor(), name, c.unit, c.value, c.sigma));
+            let sensor = name_of(effect.sensor());
+            all.push((sensor, name, c.unit, c.value, c.sigma));
         }
     }
+    all
+}
+
+fn name_of(sensor: Sensor) -> TriadName {
+    match sensor {
+        Sensor::Gyro => TriadName::GYRO,
+        Sensor::Accel => TriadName::ACCEL,
+    }
+}
+
+/// C, o, rotation, delay and lever arm of a further triad.
+fn of_body(triad: &BodyTriad) -> Vec<Named> {
+    let mut all = Vec::new();
+    let mut add = |name: String, unit: &str, value: Option<f64>, sigma: Option<f64>| {
+        let named = |value| (triad.triad, name, unit.to_owned(), value, sigma);
+        all.extend(value.map(named));
+    };
+    let per_raw = format!("{}/{}", triad.unit, triad.raw_unit);
+    for (i, row) in AXES.iter().enumerate() {
+        for (j, column) in AXES.iter().enumerate() {
+            let sigma = Some(triad.sigma_C[i][j]);
+            add(
+                format!("C {row}{column}"),
+                &per_raw,
+                Some(triad.C[i][j]),
+                sigma,
+            );
+        }
+        add(
+            format!("o {row}"),
+            &triad.unit,
+            Some(triad.o[i]),
+            Some(triad.sigma_o[i]),
+        );
+        let of = |values: Option<[f64; 3]>, factor: f64| values.map(|v| factor * v[i]);
+        let radian = 1f64.to_radians();
+        let (value, half) = (triad.rotation_deg, triad.interval_rotation_deg);
+        let sigma = of(half, radian / NORMAL_95);
+        add(format!("rotation {row}"), "rad", of(value, radian), sigma);
+        let (value, half) = (triad.lever_arm_mm, triad.interval_lever_arm_mm);
+        let sigma = of(half, 1e-3 / NORMAL_95);
+        add(format!("lever arm {row}"), "m", of(value, 1e-3), sigma);
+    }
+    let ms = |value: Option<f64>| value.map(|v| 1e-3 * v);
+    let sigma = ms(triad.interval_delay_ms).map(|half| half / NORMAL_95);
+    add("delay".into(), "s", ms(triad.delay_ms), sigma);
     all
 }

@@ -108,11 +108,12 @@ impl AsFound {
         let compared = compare(&both)?;
         let rows = compared.parameters.iter();
         let rows = rows.filter(|p| !is_of_frame(p, [old, made]));
-        let rows = rows.map(|p| {
-            let factor = old
-                .table(p.sensor)
-                .map_or(1.96, TriadTable::interval_sigmas);
-            row(p, factor, expanded(fit, p))
+        // A certificate is about the first two triads.
+        let rows = rows.filter_map(|p| Some((p.of_first()?, p)));
+        let rows = rows.map(|(sensor, p)| {
+            let table = old.table(sensor);
+            let factor = table.map_or(1.96, TriadTable::interval_sigmas);
+            row((sensor, p), factor, expanded(fit, sensor, p))
         });
         let (mut errors, mut not_applied) = (Vec::new(), None);
         match (verify(&fit.prepared, old), verify(&fit.prepared, made)) {
@@ -146,18 +147,18 @@ fn is_of_frame(p: &ComparedParameter, both: [&Calibration; 2]) -> bool {
 }
 
 /// Expanded uncertainty of a parameter by the fit: its coverage factor is its own.
-fn expanded(fit: &Fit, p: &ComparedParameter) -> Option<f64> {
-    let triad = &fit.sensor(p.sensor)?.estimated.triad;
-    let all = parameters(triad, p.sensor, fit.prepared.manifest.raw_unit);
+fn expanded(fit: &Fit, sensor: Sensor, p: &ComparedParameter) -> Option<f64> {
+    let triad = &fit.sensor(sensor)?.estimated.triad;
+    let all = parameters(triad, sensor, fit.prepared.manifest.raw_unit);
     let named = |of: &TriadParameter| format!("{} {}", of.0.words(), of.axis()) == p.name;
     let (_, estimate, _) = all.into_iter().find(|(of, ..)| named(of))?;
     Some(estimate.interval)
 }
 
-fn row(p: &ComparedParameter, factor: f64, left: Option<f64>) -> AsFoundRow {
+fn row((sensor, p): (Sensor, &ComparedParameter), factor: f64, left: Option<f64>) -> AsFoundRow {
     let found = p.sigmas.as_ref().map(|s| factor * s[0]);
     AsFoundRow {
-        sensor: p.sensor,
+        sensor,
         name: p.name.clone(),
         found: p.values[0],
         left: p.values[1],

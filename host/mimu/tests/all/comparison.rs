@@ -1,6 +1,7 @@
 //! Comparison of calibrations: for unchanged units hardly any parameter is named; a change is named with its size.
 
 use mimu::calibration::Calibration;
+use mimu::calibration::body::BodyTriad;
 use mimu::calibration::comparison::{Comparison, compare};
 use mimu::warning::Warning;
 use mimu_recording::{Manifest, RawUnit, Reference, UNNAMED};
@@ -10,7 +11,7 @@ use mimu_rig::random::Random;
 const SIGMA: f64 = 1e-3;
 
 /// A calibration of a gyro in volts whose biases are `bias`, with standard deviations of [`SIGMA`]; all other parameters are exact.
-fn calibration(bias: [f64; 3], device: &str) -> Calibration {
+pub fn calibration(bias: [f64; 3], device: &str) -> Calibration {
     let o = bias.map(|b| -b);
     let nine = |v: f64| format!("{:?}", [[v; 3]; 3]);
     let covariance = vec![vec![0.0; 12]; 12];
@@ -56,6 +57,32 @@ fn without_a_change_one_comparison_in_twenty_names_one() {
         let named = named.count();
         assert!((7..=34).contains(&named), "{count}: {named}");
     }
+}
+
+#[test]
+fn a_magnetometer_whose_hard_iron_moved_is_named_and_its_rotation_is_not() {
+    let with = |hard_iron: f64| {
+        let mut one = calibration([2.5, 2.4, 2.6], "unit");
+        one.body = vec![BodyTriad {
+            o: [hard_iron, 0.0, 0.0],
+            sigma_o: [SIGMA; 3],
+            interval_rotation_deg: Some([0.1; 3]),
+            ..crate::applied_body::turned("mag", "uT")
+        }];
+        one
+    };
+    let all = [
+        ("a".into(), with(-1.0)),
+        ("b".into(), with(-1.0 + 20.0 * SIGMA)),
+    ];
+    let found = compare(&all).unwrap();
+    let changed = found.parameters.iter().filter(|p| p.changed);
+    let changed: Vec<String> = changed
+        .map(|p| format!("{} {}", p.sensor, p.name))
+        .collect();
+    assert_eq!(changed, ["mag o x"]);
+    let rotation = found.parameters.iter().find(|p| p.name == "rotation z");
+    assert!(rotation.unwrap().p.unwrap() > 0.99);
 }
 
 #[test]

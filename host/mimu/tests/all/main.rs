@@ -1,5 +1,6 @@
 //! Estimators and designs against independently known answers.
 
+mod applied_body;
 mod comparison;
 mod design;
 mod held_out;

@@ -6,36 +6,45 @@ use super::joined::JoinedFiles;
 use super::left_out::LeftOut;
 use super::options::ImportOptions;
 use super::row::Row;
-use crate::columns::{Column, RAW_COLUMNS};
+use crate::columns::Column;
 use crate::csv_writer::write_number;
 use crate::error::{Error, Result};
 use crate::result_file::stage;
+use crate::triad_name::{TriadKind, TriadName};
 
-/// Names of the replaced columns: a name that says the unit of the raw readings would now be wrong.
-const REPLACED: [&str; 6] = [
-    "gyro_x_rad_s",
-    "gyro_y_rad_s",
-    "gyro_z_rad_s",
-    "accel_x_m_s2",
-    "accel_y_m_s2",
-    "accel_z_m_s2",
-];
+/// A triad whose readings are replaced, and the unit of the new ones.
+pub struct ReplacedTriad {
+    /// The triad.
+    pub triad: TriadName,
+    /// `rad/s`, `m/s^2`, or that of a magnetometer.
+    pub unit: String,
+}
+
+impl ReplacedTriad {
+    /// Ending of its columns' names: a name that says the unit of the raw readings would now be wrong.
+    fn ending(&self) -> &str {
+        match self.triad.kind {
+            TriadKind::Gyro => "rad_s",
+            TriadKind::Accel => "m_s2",
+            TriadKind::Mag => &self.unit,
+        }
+    }
+}
 
 /// The rows that an import of one text file reads, with all of their columns, to be written as CSV with other readings. Lines without a row and rows that
 /// the import leaves out are not copied.
 pub struct CopiedTable {
     import: JoinedFiles,
-    /// Whether the readings of gyro and accelerometer are replaced.
-    replaced: [bool; 2],
+    replaced: Vec<ReplacedTriad>,
     csv: csv::Writer<Vec<u8>>,
 }
 
 impl CopiedTable {
-    /// Opens the file of `options`.
+    /// Opens the file of `options`; the readings of these triads will be `replaced`.
     ///
     /// # Errors
     /// There are several files, it is not text, or its rows do not become samples one by one.
-    pub fn open(options: &ImportOptions, replaced: [bool; 2]) -> Result<Self> {
+    pub fn open(options: &ImportOptions, replaced: Vec<ReplacedTriad>) -> Result<Self> {
         let path = options.file(0);
         let refuse = |problem: &str| {
             let remedy = "write a recording instead: name a folder";
@@ -52,7 +61,10 @@ impl CopiedTable {
             return refuse("only text is copied");
         };
         let name = |(k, (name, column)): (usize, (String, Option<Column>))| match column {
-            Some(Column::Raw(c)) if replaced[c / 3] => REPLACED[c].to_owned(),
+            Some(column) if of(&replaced, column).is_some() => {
+                let ending = of(&replaced, column).map_or("", ReplacedTriad::ending);
+                format!("{}_{ending}", column.name())
+            }
             Some(column) if name.is_empty() => column.name().to_owned(),
             None if name.is_empty() => format!("column_{}", k + 1),
             _ => name,
@@ -69,11 +81,11 @@ impl CopiedTable {
         })
     }
 
-    /// Copies the next row, with these readings by channel; a NaN becomes an empty cell.
+    /// Copies the next row, with these readings of the columns that are replaced; a NaN becomes an empty cell.
     ///
     /// # Errors
     /// The file has no further row: it has changed since it was imported.
-    pub fn row(&mut self, readings: [f64; RAW_COLUMNS.len()]) -> Result<()> {
+    pub fn row(&mut self, readings: impl Fn(Column) -> f64) -> Result<()> {
         let file = &mut self.import.first;
         let mut row = Row::default();
         let ended = || {
@@ -88,9 +100,9 @@ impl CopiedTable {
         }
         let table = file.text().ok_or_else(ended)?;
         let replaced = table.all_cells().map(|(cell, column)| match column {
-            Some(Column::Raw(c)) if self.replaced[c / 3] => {
+            Some(column) if of(&self.replaced, column).is_some() => {
                 let mut text = Vec::new();
-                write_number(readings[c], &mut text);
+                write_number(readings(column), &mut text);
                 text
             }
             _ => cell.to_vec(),
@@ -108,4 +120,10 @@ impl CopiedTable {
             .map_err(|e| Error::io(out, e.error()))?;
         stage(out, bytes)?.publish()
     }
+}
+
+/// The replaced triad that `column` is of.
+fn of(replaced: &[ReplacedTriad], column: Column) -> Option<&ReplacedTriad> {
+    let (triad, _) = column.triad()?;
+    replaced.iter().find(|of| of.triad == triad)
 }

@@ -74,7 +74,7 @@ use std::path::Path;
 pub use assignment::{ColumnList, Role};
 pub use broken::{BrokenKind, BrokenLimit, BrokenRows};
 pub use comment_signs::CommentSigns;
-pub use copied::CopiedTable;
+pub use copied::{CopiedTable, ReplacedTriad};
 pub use decimal::Decimal;
 pub use faces::Face;
 pub use inputs::Inputs;
