@@ -13,17 +13,21 @@ mod pieces;
 pub mod result;
 mod same_body;
 mod series;
+pub mod split;
 mod verify;
 
 use mimu::fit::Fit;
 use mimu::judgement::Judgement;
 use mimu::prepared::Prepared;
 use mimu::quantity::{PerSensor, Sensor};
+use mimu::signal::stillness::DwellSearch;
 use mimu::triad::{Estimate, half_width_95};
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{Recording, TriadKind, TriadName};
+use nalgebra::Rotation3;
 
 pub use fitted::{FittedTriad, Known};
+pub use split::Split;
 pub use verify::{TriadVerification, verify};
 
 use carrier::{Carrier, Unit, read};
@@ -114,6 +118,65 @@ impl Body {
         Judgement::worst(of.chain(refused))
             .unwrap_or_else(|| judge::undetermined("it has no further triad"))
     }
+}
+
+/// The errors of turns of all pairs of a body, each fitted for itself like the first (`unit`), in the frame of the first: the part that all share, and the part of each.
+/// `None` if there is only one pair, or if turns that two pairs share are too few.
+///
+/// # Errors
+/// The samples cannot be read.
+pub fn split_turns(
+    recording: &Recording,
+    unit: &Fit,
+    search: DwellSearch,
+) -> Result<Option<Split>> {
+    let triads = recording.triads();
+    let has = |number| {
+        let kinds = [TriadKind::Gyro, TriadKind::Accel];
+        kinds.iter().all(|kind| {
+            triads.contains(&TriadName {
+                kind: *kind,
+                number,
+            })
+        })
+    };
+    let numbers: Vec<u8> = (2..=TriadName::MOST).filter(|n| has(*n)).collect();
+    let body = match numbers.is_empty() {
+        true => None,
+        false => Body::of(recording, unit, &Options::default())?,
+    };
+    let Some(body) = body else {
+        return Ok(None);
+    };
+    let mut others = Vec::new();
+    for number in numbers {
+        let gyro = TriadName {
+            kind: TriadKind::Gyro,
+            number,
+        };
+        let placed = body.triads.iter().find(|triad| triad.name == gyro);
+        let Some(placed) = placed else {
+            continue;
+        };
+        let prepared = Prepared::read(&recording.pair(number)?, search, |_| ())?;
+        // A pair that is not determined for itself says nothing of turns.
+        if let Ok(fit) = mimu::fit::fit(prepared, mimu::fit::Options::IN_SAMPLE) {
+            // The frame of its own fit is that of its accelerometer.
+            let own = TriadName {
+                kind: TriadKind::Accel,
+                number,
+            };
+            let accel = body.triads.iter().find(|triad| triad.name == own);
+            let rotation = accel.map_or(placed.rotation, |accel| accel.rotation);
+            others.push((number, fit, rotation));
+        }
+    }
+    let first = [(1, unit, Rotation3::identity())].into_iter();
+    let others = others
+        .iter()
+        .map(|(number, fit, turn)| (*number, fit, *turn));
+    let all: Vec<_> = first.chain(others).collect();
+    Ok(split::turn_errors(&all).as_ref().and_then(split::split))
 }
 
 /// The calibrations of the first two, and their readings.

@@ -116,8 +116,7 @@ pub(crate) fn read_with_samples(
     others: &[Option<&Path>],
 ) -> Result<(Prepared, Option<Recording>)> {
     let Some(means) = PoseMeans::file(directory) else {
-        let recording = open(directory, log)?;
-        let prepared = read_opened(&recording, directory, search, outputs, others)?;
+        let (prepared, recording) = read_samples(directory, log, search, outputs, others)?;
         return Ok((prepared, Some(recording)));
     };
     let manifest = directory.join(MANIFEST_FILE);
@@ -135,7 +134,20 @@ pub(crate) fn read(
     outputs: &[Option<&Path>],
     others: &[Option<&Path>],
 ) -> Result<Prepared> {
-    read_opened(&open(directory, log)?, directory, search, outputs, others)
+    Ok(read_samples(directory, log, search, outputs, others)?.0)
+}
+
+/// As [`read`], with the recording.
+pub(crate) fn read_samples(
+    directory: &Path,
+    log: &LogArgs,
+    search: DwellSearch,
+    outputs: &[Option<&Path>],
+    others: &[Option<&Path>],
+) -> Result<(Prepared, Recording)> {
+    let recording = open(directory, log)?;
+    let prepared = read_opened(&recording, directory, search, outputs, others)?;
+    Ok((prepared, recording))
 }
 
 fn read_opened(

@@ -1,5 +1,6 @@
 //! `mimu diagnose`: arguments and execution.
 
+use std::cell::RefCell;
 use std::path::PathBuf;
 
 use crate::report::{self, Made};
@@ -12,6 +13,7 @@ use mimu::plan::next_experiment;
 use mimu::prepared::Prepared;
 use mimu::recording_problem::OfRecording;
 use mimu::signal::stillness::DwellSearch;
+use mimu_body::split_turns;
 use mimu_recording::error::Result;
 
 use crate::arguments::{
@@ -20,7 +22,7 @@ use crate::arguments::{
 };
 use crate::hint::OF_A_LOG;
 use crate::output::{Results, now, progress};
-use crate::reading::{LogArgs, read};
+use crate::reading::{LogArgs, read_samples};
 use crate::report::refused;
 use crate::status::Status;
 
@@ -99,8 +101,13 @@ pub fn run(args: &DiagnoseArgs, command_line: &str) -> Result<Status> {
     ];
     let inputs = [args.noise.file.as_deref(), args.calibration.as_deref()];
     let noise = args.noise.read()?;
+    let samples = RefCell::new(Vec::new());
     let open = |path: &PathBuf| {
-        let read = |search| read(path, &args.log, search, &outputs, &inputs);
+        let read = |search| {
+            let read = read_samples(path, &args.log, search, &outputs, &inputs)?;
+            samples.borrow_mut().push(read.1);
+            Ok(read.0)
+        };
         args.opened(&read, noise.as_ref())
     };
     let given = args.calibration.as_deref().map(Calibration::read);
@@ -136,7 +143,13 @@ pub fn run(args: &DiagnoseArgs, command_line: &str) -> Result<Status> {
         all: args.verbose.verbose,
         next: args.next,
     };
+    let first = samples.take().into_iter().next();
+    let split = first.map(|first| split_turns(&first, &diagnosis.before, args.still.search()));
+    let split = split.transpose()?.flatten();
     let mut out = Results::new(report::diagnosis_text(found, detail));
+    if let Some(split) = &split {
+        out.say(&report::split_text(split));
+    }
     let place = diagnosis.before.prepared.place.clone();
     let refusal = args.writing.refusal(&found.judgement, &place, MISFIT);
     let output = args.output.as_ref().filter(|_| refusal.is_none());
@@ -163,7 +176,13 @@ pub fn run(args: &DiagnoseArgs, command_line: &str) -> Result<Status> {
         let made = Made::of(&args.recordings, command_line);
         Ok(report::diagnosis_page(found, &made))
     })?;
-    out.print(&args.json, found)?;
+    match &split {
+        None => out.print(&args.json, found)?,
+        Some(split) => {
+            let more = serde_json::json!({ "body": split });
+            out.print(&args.json, &report::with_sensors(found, &more))?;
+        }
+    }
     match refusal {
         Some(error) => Err(error),
         None => Ok(args.strict.status(&found.judgement)),

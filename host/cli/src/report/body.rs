@@ -4,12 +4,14 @@ use std::collections::BTreeMap;
 
 use maud::{Markup, html};
 use mimu::judgement::JudgementKind;
+use mimu::quantity::{p_value, plural, significant};
 use mimu_body::TriadVerification;
 use mimu_body::result::{BodyResult, EstimateResult, PlaceResult};
+use mimu_body::split::{Part, Split};
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use super::table::{by_axes, interval, number, table};
+use super::table::{between, by_axes, interval, number, table};
 use super::terminal::text;
 
 /// The section as text, after the result of a fit.
@@ -29,6 +31,53 @@ pub(crate) fn body_errors_text(found: &BTreeMap<String, TriadVerification>) -> S
             h2 { "Body" }
             (errors("Root mean square error; noise: what white noise alone would cause", heads, rows, |triad| found[triad].judgement.kind))
             @for (triad, of) in found.iter().filter(|(_, of)| !of.judgement.is_good()) { p.line { (triad) " is judged " (of.judgement) } }
+        })
+    )
+}
+
+/// What turns err by in common to all pairs of a body, and each for itself, as text.
+pub(crate) fn split_text(split: &Split) -> String {
+    let degrees = |part: &Part, label: &str| {
+        html! { tr {
+            td { (label) } (between(part.rms, [part.lower, part.upper], 1f64.to_degrees())) (number(part.noise_floor, 1f64.to_degrees()))
+        } }
+    };
+    let causes = split.correlations.iter().filter(|c| c.is_significant);
+    let causes: Vec<String> = causes
+        .map(|c| {
+            format!(
+                "{} ({} {}, {})",
+                c.term,
+                c.covariate,
+                significant(c.coefficient),
+                p_value(c.p)
+            )
+        })
+        .collect();
+    let said = match (split.exceeds_noise, causes.is_empty()) {
+        (false, _) => {
+            "the pairs share no error beyond noise: what remains is of each sensor".to_string()
+        }
+        (true, true) => {
+            "all pairs err together: it is the motion, its sampling or the clock, and no sensor"
+                .to_string()
+        }
+        (true, false) => format!(
+            "all pairs err together, and more so with {}: it is no error of a sensor",
+            causes.join(", ")
+        ),
+    };
+    format!(
+        "\n{}",
+        text(&html! {
+            h2 { "Pairs of the body" }
+            (table("Errors of the direction of gravity after each turn, of the fit, with 95 % intervals; noise: of the pair, or what is known to be common", &html! {
+                th { "error of " (plural(split.turns as u64, "turn")) ", deg" } th.n { "rms" } th.n { "noise" }
+            }, &html! {
+                (degrees(&split.common, "common to all pairs"))
+                @for (pair, own) in &split.own { (degrees(own, &format!("of pair {pair} alone"))) }
+            }))
+            p.line { (said) }
         })
     )
 }

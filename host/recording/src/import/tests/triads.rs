@@ -34,7 +34,11 @@ fn all_triads_of_a_table_are_taken_in_si_and_a_magnetometer_in_microtesla() {
     let row = |i: usize| {
         let n = 1e-3 * (i % 7) as f64;
         // Each fourth row has a field, as of a slower sensor.
-        let field = if i.is_multiple_of(4) { "0.25,-0.1,0.5" } else { ",," };
+        let field = if i.is_multiple_of(4) {
+            "0.25,-0.1,0.5"
+        } else {
+            ",,"
+        };
         format!(
             "{},{n},0.5,-0.25,{n},0,1,90,{n},0,0,{n},-1,{field}\n",
             10 * i
