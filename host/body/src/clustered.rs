@@ -105,8 +105,7 @@ impl Clusters {
         normal.fill_upper_triangle_with_lower_triangle();
         let by_weights = inverse(&normal)?;
         let step = &by_weights * &gradient;
-        let mut covariance = DMatrix::zeros(n, n);
-        let mut moves = Vec::new();
+        let mut all = Vec::new();
         let mut held_out = Vec::new();
         for (cluster, used) in self.list.iter().zip(used) {
             let mut own = cluster.normal.clone();
@@ -130,16 +129,26 @@ impl Clusters {
             let error = squares - 2.0 * moved.dot(&left) + moved.dot(&(&own * &moved));
             held_out.push(error.max(0.0) / cluster.rows);
             if *used {
-                covariance.ger(1.0, &moved, &moved, 1.0);
-                moves.push(moved.dot(&(&normal * &moved)));
+                all.push(Left { own, left, moved });
             }
         }
-        let count = moves.len() as f64;
-        covariance *= (count - 1.0) / count;
-        // Of clusters that move the solution unequally only the large ones count: Satterthwaite's degrees of freedom of their sum.
-        let sum: f64 = moves.iter().sum();
-        let squares: f64 = moves.iter().map(|m| m * m).sum();
-        let dof = (sum * sum / squares - 1.0).clamp(1.0, (count - 1.0).max(1.0));
+        let (mut covariance, mut dof) = jackknife(&normal, all.iter().map(|of| of.moved.clone()));
+        // What errs alike for longer than a cluster shows between groups of them.
+        let size = all.len().div_ceil(LONG);
+        let groups = all.chunks(size.max(1)).filter_map(|group| {
+            let zero = (DMatrix::zeros(n, n), DVector::zeros(n));
+            let (own, left) = group
+                .iter()
+                .fold(zero, |(own, left), of| (own + &of.own, left + &of.left));
+            Some(-(inverse(&(&normal - own))? * left))
+        });
+        let (long, few) = jackknife(&normal, groups);
+        let ratio = long.diagonal().component_div(&covariance.diagonal());
+        if ratio.iter().any(|ratio| *ratio > LONGER) {
+            let wider = ratio.map(|ratio| if ratio > LONGER { ratio.sqrt() } else { 1.0 });
+            covariance = DMatrix::from_fn(n, n, |i, j| covariance[(i, j)] * wider[i] * wider[j]);
+            dof = dof.min(few);
+        }
         Some(Solution {
             step,
             covariance,
@@ -159,6 +168,36 @@ impl Clusters {
         normal.fill_upper_triangle_with_lower_triangle();
         Some(inverse(&normal)? * gradient)
     }
+}
+
+/// A cluster at the solution: its normal matrix, its gradient, and where the solution moves without it.
+struct Left {
+    own: DMatrix<f64>,
+    left: DVector<f64>,
+    moved: DVector<f64>,
+}
+
+/// Number of long groups of clusters, and the ratio of variances beyond which they are believed: chance exceeds it in one of 200 parameters.
+const LONG: usize = 8;
+const LONGER: f64 = 3.0;
+
+/// Covariance by the moves of the solution without each part, and its degrees of freedom. Of parts that move the solution unequally only the large ones count:
+/// those are Satterthwaite's of the sum of their moves, measured by `normal`.
+fn jackknife(
+    normal: &DMatrix<f64>,
+    moves: impl Iterator<Item = DVector<f64>>,
+) -> (DMatrix<f64>, f64) {
+    let n = normal.nrows();
+    let mut covariance = DMatrix::zeros(n, n);
+    let (mut count, mut sum, mut squares) = (0.0, 0.0, 0.0);
+    for moved in moves {
+        covariance.ger(1.0, &moved, &moved, 1.0);
+        let size = moved.dot(&(normal * &moved));
+        (count, sum, squares) = (count + 1.0, sum + size, squares + size * size);
+    }
+    covariance *= (count - 1.0) / count;
+    let dof = (sum * sum / squares - 1.0).clamp(1.0, f64::max(count - 1.0, 1.0));
+    (covariance, dof)
 }
 
 /// Smallest eigenvalue of the matrix with a unit diagonal that is inverted. Rounding leaves 1e-16 of it.
@@ -213,6 +252,23 @@ mod tests {
             .filter(|(slope, s)| (slope - 2.0).abs() < 2.02 * s);
         let share = inside.count() as f64 / 200.0;
         assert!((0.91..=0.985).contains(&share), "{share}");
+    }
+
+    #[test]
+    fn errors_in_common_to_many_clusters_widen_the_interval_too() {
+        let zero = DVector::zeros(1);
+        let wide = (0..100).filter(|seed| {
+            let mut clusters = Clusters::new(40, &zero, &zero, &DVector::repeat(1, f64::INFINITY));
+            for g in 0..40 {
+                let long = noise(1000 * seed + g / 5);
+                let error = long + 0.1 * noise(1000 * seed + 50 + g);
+                clusters.add(g, error, &DVector::repeat(1, 1.0), 1.0);
+            }
+            let solution = clusters.solve(&[true; 40]).unwrap();
+            solution.step[0].abs() < 2.36 * solution.covariance[(0, 0)].sqrt()
+        });
+        let inside = wide.count();
+        assert!((85..=100).contains(&inside), "{inside}");
     }
 
     #[test]

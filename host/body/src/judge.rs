@@ -82,9 +82,12 @@ pub(crate) fn determines(field: &Field) -> Result<(), Judgement> {
     if field.worst_rad <= DETERMINED_RAD {
         return Ok(());
     }
+    let by = match field.worst_rad.to_degrees() {
+        degrees if degrees < 60.0 => format!("uncertain by {} deg", significant(degrees)),
+        _ => "not determined".to_string(),
+    };
     Err(undetermined(format!(
-        "the direction of the field is uncertain by {} deg in some poses: bring each axis to point each way, and turn about all three",
-        significant(field.worst_rad.to_degrees())
+        "the direction of the field is {by} in some poses: bring each axis to point each way, and turn about all three"
     )))
 }
 

@@ -54,13 +54,23 @@ impl Series {
     }
 
     /// Without samples that repeat the one before: a slower triad whose last reading is written again.
+    ///
+    /// Where it is read in an uneven rhythm it has a clock of its own, and a new reading is on average half a row old when it is first written.
     pub fn without_repeats(self) -> Self {
         let is_new = |k: usize| k == 0 || self.x[k] != self.x[k - 1];
         let new: Vec<usize> = (0..self.len()).filter(|k| is_new(*k)).collect();
         if new.len() * 10 > self.len() * 9 {
             return self;
         }
-        let all = new.iter().map(|k| (self.t[*k], self.x[*k])).collect();
+        let usual = self.len() as f64 / new.len() as f64;
+        let runs = new.windows(2).map(|w| (w[1] - w[0]) as f64);
+        let even = runs.filter(|run| (run - usual).abs() < 0.2).count();
+        let age = if even * 10 > new.len() * 9 {
+            0.0
+        } else {
+            0.5 * self.period
+        };
+        let all = new.iter().map(|k| (self.t[*k] - age, self.x[*k])).collect();
         let before = [0].iter().chain(&new).zip(&new);
         let broken: Vec<bool> = before.map(|(a, b)| self.is_broken(*a, *b)).collect();
         Self::of(all, &broken)
@@ -253,6 +263,18 @@ pub(crate) mod tests {
         assert!(series.is_broken(99, 100) && !series.is_broken(0, 99));
         x.truncate(100);
         assert_eq!(Series::new(&t[..100], [&x, &x, &x]).len(), 100);
+    }
+
+    #[test]
+    fn readings_that_are_written_again_are_left_out_and_those_of_an_uneven_rhythm_are_half_a_row_old()
+     {
+        let t: Vec<f64> = (0..700).map(|k| 0.01 * f64::from(k)).collect();
+        for (share, age) in [(1.0, 0.0), (0.5, 0.0), (5.0 / 7.0, 0.005)] {
+            let x: Vec<f64> = (0..700).map(|k| (share * f64::from(k)).floor()).collect();
+            let left = Series::new(&t, [&x, &x, &x]).without_repeats();
+            assert_eq!(left.len(), (700.0 * share) as usize);
+            assert!((left.t[0] + age).abs() < 1e-12, "{share}: {}", left.t[0]);
+        }
     }
 
     #[test]
