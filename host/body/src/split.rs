@@ -107,8 +107,6 @@ pub struct Split {
 struct Products {
     /// Means of `r_i·r_k`, rad².
     product: DMatrix<f64>,
-    /// Means of `|r_i - r_k|²`, rad².
-    difference: DMatrix<f64>,
     /// Degrees of freedom of `r_i·r_k`: the fewer, the more of both sizes is in a few turns.
     dof: DMatrix<f64>,
     pairs: usize,
@@ -117,7 +115,7 @@ struct Products {
 impl Products {
     fn of(pairs: &[PairErrors]) -> Option<Self> {
         let zeros = DMatrix::zeros(pairs.len(), pairs.len());
-        let [mut product, mut difference, mut dof] = [zeros.clone(), zeros.clone(), zeros];
+        let [mut product, mut dof] = [zeros.clone(), zeros];
         for (i, k) in (0..pairs.len()).flat_map(|i| (0..pairs.len()).map(move |k| (i, k))) {
             let both = pairs[i].errors.iter().zip(&pairs[k].errors);
             let both: Vec<_> = both.filter(|(a, b)| is_known(a) && is_known(b)).collect();
@@ -130,7 +128,6 @@ impl Products {
                 return None;
             }
             product[(i, k)] = mean(&|a, b| a.dot(b));
-            difference[(i, k)] = mean(&|a, b| (a - b).norm_squared());
             // Vectors of these sizes and any direction in a plane: the mean of (a·b)² is |a|²|b|²/2.
             let left = (pairs[i].left * pairs[k].left).sqrt();
             let unequal = mean(&|a, b| a.norm_squared() * b.norm_squared());
@@ -139,7 +136,6 @@ impl Products {
         let pairs = pairs.len();
         Some(Self {
             product,
-            difference,
             dof,
             pairs,
         })
@@ -155,22 +151,8 @@ impl Products {
         sum / weight
     }
 
-    /// Sum of the mean squares of the own parts.
-    fn all_own(&self) -> f64 {
-        0.5 * self.difference.sum() / (self.pairs as f64 - 1.0)
-    }
-
-    /// Mean square of the own part of each. The difference of only two is divided by what each has in common with the other.
-    fn own(&self) -> Vec<f64> {
-        let of = |i: usize| match self.pairs {
-            2 => self.product[(i, i)] - self.product[(0, 1)],
-            n => (self.difference.row(i).sum() - self.all_own()) / (n as f64 - 2.0),
-        };
-        (0..self.pairs).map(of).collect()
-    }
-
     /// Probability of the agreement without a common part other than the mean square `known`.
-    fn chance(&self, known: f64) -> f64 {
+    fn chance(&self, own: &[f64], known: f64) -> f64 {
         let (equal, n) = (vec![1.0; self.pairs], self.pairs as f64);
         let others = n - 1.0;
         let sf = |ratio: f64, dof: f64, of: f64| {
@@ -187,9 +169,9 @@ impl Products {
             return none;
         }
         // Beyond what is known: the square of the mean of all, by Satterthwaite's degrees of freedom.
-        let own = self.own().into_iter().map(|own| own.max(0.0));
+        let in_mean = own.iter().sum::<f64>() / (n * n);
+        let own = own.iter().map(|own| own.max(0.0));
         let [sum, squares] = own.fold([0.0; 2], |[a, b], own| [a + own, b + own * own]);
-        let in_mean = self.all_own() / (n * n);
         let found = self.mean(&equal, |at| self.product[at]) + in_mean;
         let expected = known + in_mean;
         let of = (sum * sum / squares) * others / n * dof * (expected / in_mean).powi(2);
@@ -201,7 +183,7 @@ impl Products {
 pub fn split(of: &TurnErrors) -> Option<Split> {
     let count = of.pairs.len();
     let products = (count > 1).then(|| Products::of(&of.pairs))??;
-    let own = products.own();
+    let own = of.own();
     let noise: Vec<f64> = of.pairs.iter().map(PairErrors::noise_square).collect();
     // No pair errs by less than its noise.
     let least = |i: usize| noise[i].max(1e-4 * products.product[(i, i)]);
@@ -216,13 +198,13 @@ pub fn split(of: &TurnErrors) -> Option<Split> {
         // In the difference between this pair and the mean of the others, or what both of two share.
         let beside = match count {
             2 => common.max(0.0),
-            n => (products.all_own() - own[i]).max(0.0) / ((n - 1) as f64).powi(2),
+            n => (own.iter().sum::<f64>() - own[i]).max(0.0) / ((n - 1) as f64).powi(2),
         };
         let dof = 2.0 * of.pairs[i].left * of.pairs[i].known().count() as f64;
         let part = Part::of([own[i] + beside, beside], [dof, others], noise[i]);
         (of.pairs[i].pair, part)
     };
-    let p = products.chance(known);
+    let p = products.chance(&own, known);
     let means = of.means(&weights);
     Some(Split {
         turns: means.iter().filter(|mean| is_known(mean)).count(),
@@ -271,6 +253,28 @@ impl PairErrors {
 }
 
 impl TurnErrors {
+    /// Mean square of the own part of each pair over the turns that it has. Two pairs are divided by what each has in common with the other.
+    fn own(&self) -> Vec<f64> {
+        let mut own = vec![[0.0; 2]; self.pairs.len()];
+        for j in 0..self.conditions.len() {
+            let errors = self.pairs.iter().map(|pair| pair.errors[j]);
+            let known: Vec<_> = errors.enumerate().filter(|of| is_known(&of.1)).collect();
+            let n = known.len() as f64;
+            let sum: Vector3<f64> = known.iter().map(|of| of.1).sum();
+            let squares: f64 = known.iter().map(|of| of.1.norm_squared()).sum();
+            let differences = (n * squares - sum.norm_squared()) / (n - 1.0);
+            for (i, error) in known.iter().filter(|_| n > 1.0) {
+                let to_others = n * error.norm_squared() - 2.0 * error.dot(&sum) + squares;
+                own[*i][0] += match known.len() {
+                    2 => error.dot(&(error * 2.0 - sum)),
+                    _ => (to_others - differences) / (n - 2.0),
+                };
+                own[*i][1] += 1.0;
+            }
+        }
+        own.iter().map(|[sum, turns]| sum / turns).collect()
+    }
+
     /// Weighted mean of each turn's errors; not a number unless two pairs have it.
     fn means(&self, weights: &[f64]) -> Vec<Vector3<f64>> {
         let mean = |j: usize| {

@@ -246,6 +246,19 @@ fn turns_that_some_pairs_lack_are_left_to_the_others() {
     let part = split(&body).expect("pairs share turns");
     assert_eq!([whole.turns, part.turns], [TURNS, TURNS]);
     assert!((part.common.rms / whole.common.rms - 1.0).abs() < 0.1);
+    // One turn in which some err by far more does not count for a pair that lacks it.
+    let before = split(&body).expect("pairs share turns").own[&8].rms;
+    for pair in &mut body.pairs[..3] {
+        let error = pair.errors[14];
+        pair.errors[14] = error * (20e-3 / error.norm());
+    }
+    let after = split(&body).expect("pairs share turns").own;
+    assert!(
+        (after[&8].rms / before - 1.0).abs() < 0.1,
+        "{} {before}",
+        after[&8].rms
+    );
+    assert!(after[&1].rms > 2e-3, "{}", after[&1].rms);
     for pair in &mut body.pairs[1..] {
         pair.errors[5..].fill(Vector3::repeat(f64::NAN));
     }
