@@ -335,9 +335,14 @@ fn one(args: &FitArgs, recording: &Path) -> Result<Status> {
             return Err(why);
         }
     };
-    let body = samples.map(|samples| Body::of(&samples, &fitted, &args.body()));
-    let body = body.transpose()?.flatten();
     let result = FitResult::of(&fitted);
+    let is_misfit = result.judgement.needs_consent().is_some();
+    // Beside a first triad that its calibration makes worse, the readings themselves are the better reference.
+    let body = samples.map(|samples| match is_misfit && prepared.is_in_si() {
+        true => Body::of_readings(&samples, &prepared, &args.body()),
+        false => Body::of(&samples, &fitted, &args.body()),
+    });
+    let body = body.transpose()?.flatten();
     let mut text = report::fit_text(&result, args.verbose.verbose);
     text += &budget_text(&result);
     if let Some((path, prior)) = args.prior.as_ref().zip(fitted.prepared.prior.as_ref()) {

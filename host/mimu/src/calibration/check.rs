@@ -78,6 +78,7 @@ impl Calibration {
             check_both_ways(table, &forward, &place)?;
         }
         self.check_temperatures(place)?;
+        self.check_body(place)?;
         let digits = |id: &str| id.len() == 24 && id.bytes().all(|b| b.is_ascii_hexdigit());
         if let Some(id) = self.unit_id.as_ref().filter(|id| !digits(id)) {
             return Err(Error::new(
@@ -95,6 +96,35 @@ impl Calibration {
         }
         effect::check(&self, place)?;
         Ok(self)
+    }
+
+    /// Whether each further triad is there once, and can be applied.
+    fn check_body(&self, place: &str) -> Result<()> {
+        for (k, of) in self.body.iter().enumerate() {
+            let arm = of.lever_arm_mm.iter().flatten();
+            let rotation = of.rotation_deg.iter().flatten();
+            let numbers =
+                of.C.iter()
+                    .flatten()
+                    .chain(&of.o)
+                    .chain(rotation)
+                    .chain(arm);
+            let matrix = Matrix3::from_fn(|i, j| of.C[i][j]);
+            let problem = if !numbers.chain(&of.delay_ms).all(|x| x.is_finite()) {
+                "it has an entry that is not a number"
+            } else if matrix.try_inverse().is_none() {
+                "C is singular"
+            } else if of.formula != FORMULA {
+                "its formula is unknown: only x = C u + o can be applied"
+            } else if self.body[..k].iter().any(|other| other.triad == of.triad) {
+                "it is there twice"
+            } else {
+                continue;
+            };
+            let place = format!("{place}, [[body]] of {}", of.triad);
+            return Err(Error::new(place, problem, "fit the recording again"));
+        }
+        Ok(())
     }
 
     fn check_format(&self, place: &str) -> Result<()> {
