@@ -30,7 +30,7 @@ def read(
     where: Mapping[str, Any] | None = None,
     rows: str | None = None,
     topic: str | Sequence[str] | None = None,
-    instance: int | None = None,
+    instance: int | str | None = None,
     means: bool = False,
     sequence: bool = False,
     faces: Mapping[str, Path] | None = None,

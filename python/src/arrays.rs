@@ -85,6 +85,7 @@ impl InMemory for Arrays {
             gyro: has("gyro"),
             accel: has("accel"),
             reference: [rate, rate, rate, force, force, force],
+            ..Columns::default()
         }
     }
 

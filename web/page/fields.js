@@ -19,6 +19,12 @@ const TO_SI = {
   gyro: { "rad/s": 1, "deg/s": Math.PI / 180, "mdeg/s": Math.PI / 180000 },
 };
 
+/** Factors of a magnetometer to µT. */
+const TO_MICROTESLA = { "µT": 1, nT: 1e-3, mG: 0.1, mT: 1e3, gauss: 100, T: 1e6 };
+
+/** Triad of a column and its kind: `["gyro2", "gyro"]` of `gyro2_x`. */
+const triadOf = (role) => /^((gyro|accel|mag)\d*)_x$/.exec(role)?.slice(1);
+
 /** Field that sets an argument of the command. */
 export const FIELD_OF = {
   "--columns": "files", "--rate-hz": "rate", "--time-unit": "time-unit", "--gravity": "gravity", "--latitude": "latitude", "--topic": "topic",
@@ -29,11 +35,14 @@ export const FIELD_OF = {
 
 /** Shows the columns of `looked`, the answer of `columns`, each with its guessed role, and `units`, from which the log may be. */
 export function show(looked, units) {
+  const known = new Set(ROLES.map(([value]) => value));
+  const further = new Set(looked.files.flatMap((file) => file.roles ?? []).filter((role) => !known.has(role)));
+  const all = [...ROLES, ...[...further].map((role) => [role, role.replace("_", " ")])];
   const lists = looked.files.map((file, k) => {
     const columns = file.roles.map((role, at) => {
       const name = file.names[at] ?? `column ${at + 1}`;
-      const select = made("select", { id: `role-${k}-${at}` }, ...ROLES.map(([value, text]) => made("option", { value, textContent: text })));
-      select.value = ROLES.some(([value]) => value === role) ? role : "-";
+      const select = made("select", { id: `role-${k}-${at}` }, ...all.map(([value, text]) => made("option", { value, textContent: text })));
+      select.value = role;
       const cells = made("span", { className: "cells", textContent: file.rows.map((row) => row[at] ?? "").join("  ") });
       const label = made("label", {}, made("span", { className: "label", textContent: name }), cells, select);
       const item = made("li", { className: "column" }, label);
@@ -136,6 +145,13 @@ function importArguments(looked, names, roles, device, alone = false) {
     const units = present.map((sensor) => $(`${sensor}-unit`).value);
     const si = present.every((sensor, k) => units[k] in TO_SI[sensor]);
     if (si) {
+      const triads = roles.flat().map(triadOf).filter(Boolean);
+      const mag = looked.files.map((file) => TO_MICROTESLA[file.mag_unit]).find(Boolean);
+      // The factors of a preset are complete.
+      for (const [triad, kind] of preset ? [] : triads.filter(([triad]) => !["gyro", "accel"].includes(triad))) {
+        const factor = kind === "mag" ? mag : TO_SI[kind][units[present.indexOf(kind)]];
+        if ((factor ?? 1) !== 1) args.push("--scale", `${triad}=${factor}`);
+      }
       present.forEach((sensor, k) => TO_SI[sensor][units[k]] !== 1 && args.push("--scale", `${sensor}=${TO_SI[sensor][units[k]]}`));
       args.push("--raw-unit", "SI");
     } else args.push("--raw-unit", units.every((unit) => unit === "V") ? "V" : "count");

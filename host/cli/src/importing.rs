@@ -7,8 +7,8 @@ use clap::{Args, CommandFactory};
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::look::{Given, Look};
 use mimu_recording::{
-    Chosen, Face, ImportOptions, ImportSummary, LogOptions, Preset, RawUnit, Reference,
-    SampleFormat, Scale, import, is_log, log_formats,
+    Chosen, Column, ColumnList, Face, ImportOptions, ImportSummary, LogOptions, Preset, RawUnit,
+    Reference, Role, SampleFormat, Scale, TriadKind, TriadName, import, is_log, log_formats,
 };
 
 use crate::Cli;
@@ -205,9 +205,19 @@ fn by_units(args: &mut ImportArgs, preset: Option<&Chosen>) -> Result<Option<Raw
         return Err(Error::new("--units", problem, remedy));
     }
     let (unit, factors) = units.conversion()?;
-    for (sensor, factor) in ["gyro", "accel"].into_iter().zip(factors) {
-        if let Some(factor) = factor.filter(|factor| *factor != 1.0) {
-            args.log.scale.push(format!("{sensor}={factor}").parse()?);
+    for (kind, factor) in [TriadKind::Gyro, TriadKind::Accel].into_iter().zip(factors) {
+        let Some(factor) = factor.filter(|factor| *factor != 1.0) else {
+            continue;
+        };
+        let first = TriadName::first(kind);
+        let roles = args.log.columns.iter().flat_map(ColumnList::roles);
+        let triads = roles.filter_map(|role| match role {
+            Role::Column(Column::More(triad, 0)) if triad.kind == kind => Some(triad),
+            _ => None,
+        });
+        let triads: Vec<TriadName> = [first].into_iter().chain(triads).collect();
+        for triad in triads {
+            args.log.scale.push(format!("{triad}={factor}").parse()?);
         }
     }
     Ok(Some(unit))

@@ -115,14 +115,27 @@ pub(crate) fn read_samples_or_means(
     outputs: &[Option<&Path>],
     others: &[Option<&Path>],
 ) -> Result<Prepared> {
+    Ok(read_with_samples(directory, log, search, outputs, others)?.0)
+}
+
+/// As [`read_samples_or_means`], with the recording, if it is one of samples.
+pub(crate) fn read_with_samples(
+    directory: &Path,
+    log: &LogArgs,
+    search: DwellSearch,
+    outputs: &[Option<&Path>],
+    others: &[Option<&Path>],
+) -> Result<(Prepared, Option<Recording>)> {
     let Some(means) = PoseMeans::file(directory) else {
-        return read(directory, log, search, outputs, others);
+        let recording = open(directory, log)?;
+        let prepared = read_opened(&recording, directory, search, outputs, others)?;
+        return Ok((prepared, Some(recording)));
     };
     let manifest = directory.join(MANIFEST_FILE);
     let mut inputs: Vec<&Path> = vec![&manifest, &means];
     inputs.extend(others.iter().flatten());
     check_outputs(outputs, &inputs)?;
-    Prepared::of_means(&PoseMeans::open(directory)?)
+    Ok((Prepared::of_means(&PoseMeans::open(directory)?)?, None))
 }
 
 /// Reads a recording, after checking that the results can be written and overwrite no input.
@@ -133,13 +146,22 @@ pub(crate) fn read(
     outputs: &[Option<&Path>],
     others: &[Option<&Path>],
 ) -> Result<Prepared> {
-    let recording = open(directory, log)?;
+    read_opened(&open(directory, log)?, directory, search, outputs, others)
+}
+
+fn read_opened(
+    recording: &Recording,
+    directory: &Path,
+    search: DwellSearch,
+    outputs: &[Option<&Path>],
+    others: &[Option<&Path>],
+) -> Result<Prepared> {
     let manifest = recording.directory.join(MANIFEST_FILE);
     let mut inputs: Vec<&Path> = vec![&manifest, &recording.samples, directory];
     inputs.extend(others.iter().flatten());
     check_outputs(outputs, &inputs)?;
     let bar = progress("reading");
-    let prepared = Prepared::read(&recording, search, |share| bar.reach(share));
+    let prepared = Prepared::read(recording, search, |share| bar.reach(share));
     bar.finish();
     prepared
 }

@@ -1,6 +1,7 @@
 //! A run of consecutive rows, column by column.
 
 use super::columns::{Column, Columns};
+use super::triad_name::TriadName;
 
 /// Consecutive rows of a recording, one vector a column.
 ///
@@ -19,6 +20,8 @@ pub struct Batch {
     pub raw: [Vec<f64>; 6],
     /// Known inputs in the order of [`super::REFERENCE_COLUMNS`], in deg/s and m/s² as in the file; NaN is unknown.
     pub reference: [Vec<f64>; 6],
+    /// Raw readings of further triads in the order of [`TriadName::all`], each once; NaN is an empty cell.
+    pub more: Vec<(TriadName, [Vec<f64>; 3])>,
 }
 
 impl Batch {
@@ -39,6 +42,10 @@ impl Batch {
             Column::Step => None,
             Column::Temperature => Some(&self.temp_c),
             Column::Raw(i) => Some(&self.raw[i]),
+            Column::More(triad, axis) => Some(match self.find(triad) {
+                Ok(at) => self.more[at].1[axis].as_slice(),
+                Err(_) => &[],
+            }),
             Column::Reference(i) => Some(&self.reference[i]),
         }
     }
@@ -50,23 +57,41 @@ impl Batch {
             Column::Step => None,
             Column::Temperature => Some(&mut self.temp_c),
             Column::Raw(i) => Some(&mut self.raw[i]),
+            Column::More(triad, axis) => {
+                let at = self.find(triad).unwrap_or_else(|at| {
+                    self.more.insert(at, (triad, Default::default()));
+                    at
+                });
+                Some(&mut self.more[at].1[axis])
+            }
             Column::Reference(i) => Some(&mut self.reference[i]),
         }
+    }
+
+    /// Place of `triad` in [`Self::more`], or where it belongs.
+    fn find(&self, triad: TriadName) -> std::result::Result<usize, usize> {
+        let place = |of: &(TriadName, _)| of.0.place();
+        self.more.binary_search_by_key(&triad.place(), place)
     }
 
     /// Removes the rows and keeps the memory.
     pub fn clear(&mut self) {
         self.step.clear();
-        for column in Column::all() {
+        for column in Column::fixed() {
             if let Some(values) = self.values_mut(column) {
                 values.clear();
             }
         }
+        let more = self.more.iter_mut().flat_map(|(_, axes)| axes);
+        more.for_each(Vec::clear);
     }
 
     /// First column whose length does not fit `columns`, if there is one.
     pub(super) fn ragged(&self, columns: &Columns) -> Option<Column> {
-        Column::all().find(|&column| {
+        let more = self.more.iter().map(|(triad, _)| *triad);
+        let more = more.chain(columns.more.iter());
+        let more = more.flat_map(|triad| [0, 1, 2].map(|axis| Column::of(triad, axis)));
+        Column::fixed().chain(more).find(|&column| {
             let length = self.values(column).map_or(self.step.len(), <[f64]>::len);
             length != if columns.has(column) { self.len() } else { 0 }
         })

@@ -55,6 +55,14 @@ impl CsvFile {
         })
     }
 
+    /// The same file with its pair `number` in the places of the first.
+    pub fn of_pair(&self, number: u8) -> Self {
+        Self {
+            layout: self.layout.of_pair(number),
+            ..self.clone()
+        }
+    }
+
     /// Leaves out what follows the last line break, and returns whether there is something. In an unfinished file, which may still grow, this may be half
     /// a row, and half a number reads like a whole one.
     pub fn leave_out_cut_row(&mut self) -> Result<bool> {

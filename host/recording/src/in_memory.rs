@@ -2,11 +2,12 @@
 
 use std::fmt;
 use std::ops::Range;
+use std::sync::Arc;
 
 use sha2::{Digest, Sha256};
 
 use crate::batch::Batch;
-use crate::columns::{Column, Columns};
+use crate::columns::{Column, Columns, behind_pair};
 use crate::digest::hex;
 use crate::error::{Argument, Error, Result};
 
@@ -26,6 +27,28 @@ pub trait InMemory: fmt::Debug + Send + Sync {
     /// # Errors
     /// The other program fails to provide them.
     fn append(&self, column: Column, rows: Range<usize>, values: &mut Vec<f64>) -> Result<()>;
+}
+
+/// Samples with the pair `number` in the places of the first.
+#[derive(Debug)]
+pub(super) struct PairInMemory {
+    pub samples: Arc<dyn InMemory>,
+    pub number: u8,
+}
+
+impl InMemory for PairInMemory {
+    fn rows(&self) -> usize {
+        self.samples.rows()
+    }
+
+    fn columns(&self) -> Columns {
+        self.samples.columns().of_pair(self.number)
+    }
+
+    fn append(&self, column: Column, rows: Range<usize>, values: &mut Vec<f64>) -> Result<()> {
+        let column = behind_pair(column, self.number);
+        self.samples.append(column, rows, values)
+    }
 }
 
 /// Sample rate, Hz, from the median interval of `times`, s, which neither gaps nor bursts move.
@@ -81,8 +104,6 @@ pub(super) fn for_each_batch(
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
-
     use super::*;
     use crate::declared::{RawUnit, Reference};
     use crate::manifest::Manifest;

@@ -43,6 +43,7 @@ mod strict_file;
 mod tests;
 mod toml_file;
 mod triad_name;
+mod triads;
 mod turntable;
 mod unit_name;
 mod warning;
@@ -62,10 +63,10 @@ pub use declared::{Rails, RawUnit, Reference, WholeTurns};
 pub use growing::Growing;
 pub use import::{
     BrokenKind, BrokenLimit, BrokenRows, Chosen, ColumnList, CommentSigns, CopiedTable, Decimal,
-    Face, ImportOptions, ImportSummary, Inputs, Jitter, LogOptions, Offset, PerColumn, PoseMean,
-    PoseMeans, Preset, PresetUse, Preview, ReadingUnits, Role, Rounds, RowFilter, RowRange, Scale,
-    SkippedLines, TimeSummary, TwosComplement, Zero, import, is_log, labelled, log_formats, look,
-    preview,
+    Face, ImportOptions, ImportSummary, Inputs, Instance, Jitter, LogOptions, Offset, PerColumn,
+    PoseMean, PoseMeans, Preset, PresetUse, Preview, ReadingUnits, Role, Rounds, RowFilter,
+    RowRange, Scale, SkippedLines, TimeSummary, TwosComplement, Zero, import, is_log, labelled,
+    log_formats, look, preview,
 };
 pub use in_memory::{InMemory, usual_rate_hz};
 pub use manifest::{Format, MANIFEST_FILE, Manifest, Source};
@@ -76,6 +77,7 @@ pub use reference_error::{NORMAL_95, ReferenceError};
 pub use separator::Separator;
 pub use toml_file::{check_kind, parse_toml, read_text};
 pub use triad_name::{TriadKind, TriadName};
+pub use triads::Triads;
 pub use turntable::{Turntable, TurntableRate, rate_error};
 pub use unit_name::{UNNAMED, are_two_units, two_units};
 pub use warning::Warning;

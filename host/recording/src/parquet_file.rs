@@ -109,8 +109,7 @@ impl ParquetFile {
                 .is_some_and(|part| part == name)
         };
         let index = (0..schema.num_columns()).find(of_name);
-        let missing = || Error::new(&place, "the column is missing", "check the name");
-        let index = index.ok_or_else(missing)?;
+        let index = index.ok_or_else(|| missing(&place))?;
         let column = schema.column(index);
         let info = column.self_type().get_basic_info();
         let repeated = info.has_repetition() && info.repetition() == Repetition::REPEATED;
@@ -165,9 +164,11 @@ impl ParquetFile {
     ) -> Result<u64> {
         let place = self.path.display().to_string();
         let mut cursors = Vec::new();
-        for (slot, name) in layout.slots.iter().zip(&self.names()) {
+        let names = self.names();
+        for (slot, name) in layout.slots.iter().zip(&names) {
             if let Some(column) = *slot {
-                cursors.push((column, Cursor::new(self, self.leaf(name)?)));
+                let cursor = Cursor::new(self, self.leaf(name)?);
+                cursors.push((column, name.as_str(), cursor));
             }
         }
         let (rows, mut first) = (self.rows, 0);
@@ -187,15 +188,21 @@ impl ParquetFile {
         Ok(rows)
     }
 
-    /// One column, steps as numbers; the bytes of the others are not read.
-    pub fn column(&self, column: Column) -> Result<Vec<f64>> {
-        let mut cursor = Cursor::new(self, self.leaf(column.name())?);
+    /// One column of `layout`, steps as numbers; the bytes of the others are not read.
+    pub fn column(&self, layout: &Layout, column: Column) -> Result<Vec<f64>> {
+        let names = self.names();
+        let at = layout.slots.iter().position(|slot| *slot == Some(column));
+        let name = at.and_then(|at| names.get(at)).ok_or_else(|| {
+            let place = self.path.display();
+            missing(&format!("{place}, column {}", column.name()))
+        })?;
+        let mut cursor = Cursor::new(self, self.leaf(name)?);
         // A damaged footer may promise any number of rows.
         let mut all = Vec::with_capacity(self.rows.min(MOST_RESERVED) as usize);
         while (all.len() as u64) < self.rows {
             let first = all.len() as u64;
             let count = (self.rows - first).min(SLICE as u64) as usize;
-            let decoded = decode_slice(column, &mut cursor, first, count)
+            let decoded = decode_slice((column, name), &mut cursor, first, count)
                 .map_err(|fault| fault.at(&self.path.display().to_string()))?;
             match decoded {
                 Decoded::Values(values) => all.extend(values),
@@ -206,11 +213,16 @@ impl ParquetFile {
     }
 }
 
+fn missing(place: &str) -> Error {
+    Error::new(place, "the column is missing", "check the name")
+}
+
 /// What is wrong with a slice of a column.
 struct Fault {
     /// Number of the row from 0.
     row: u64,
-    column: &'static str,
+    /// Name of the column in the file.
+    column: String,
     refusal: Refusal,
 }
 
@@ -229,7 +241,7 @@ enum Decoded {
 
 /// A slice of some columns. If several fail, the earliest row is reported.
 fn decode(
-    cursors: &mut [(Column, Cursor)],
+    cursors: &mut [(Column, &str, Cursor)],
     first: u64,
     count: usize,
 ) -> std::result::Result<Batch, Fault> {
@@ -238,8 +250,8 @@ fn decode(
         ..Batch::default()
     };
     let mut fault: Option<Fault> = None;
-    for (column, cursor) in cursors {
-        match decode_slice(*column, cursor, first, count) {
+    for (column, name, cursor) in cursors {
+        match decode_slice((*column, name), cursor, first, count) {
             Ok(Decoded::Steps(steps)) => batch.step = steps,
             Ok(Decoded::Values(values)) => {
                 if let Some(target) = batch.values_mut(*column) {
@@ -256,14 +268,14 @@ fn decode(
 }
 
 fn decode_slice(
-    column: Column,
+    (column, name): (Column, &str),
     cursor: &mut Cursor,
     first: u64,
     count: usize,
 ) -> std::result::Result<Decoded, Fault> {
     let fault = |row: usize, refusal| Fault {
         row: first + row as u64,
-        column: column.name(),
+        column: name.to_owned(),
         refusal,
     };
     let mut values = Vec::new();

@@ -7,9 +7,10 @@ use super::batch::Batch;
 use super::columns::{Column, Columns, Layout};
 use super::csv_file::{CsvFile, PIECE};
 use super::digest;
-use super::in_memory::{self, InMemory};
+use super::in_memory::{self, InMemory, PairInMemory};
 use super::manifest::{MANIFEST_FILE, Manifest};
 use super::parquet_file::{ParquetFile, SLICE};
+use super::triad_name::{TriadKind, TriadName};
 use super::warning::Warning;
 use crate::error::{Error, Result};
 
@@ -23,7 +24,7 @@ pub struct Recording {
     pub directory: PathBuf,
     /// `samples.csv` or `samples.parquet` in that directory. For samples in memory, this and `directory` are the name of the device.
     pub samples: PathBuf,
-    /// What messages call it: its samples, or the log that they were imported from.
+    /// What messages call it: its samples, or the log that they were imported from, with the pair that is viewed.
     pub place: String,
     /// Which of the optional columns there are.
     pub columns: Columns,
@@ -138,11 +139,11 @@ impl Recording {
         })
     }
 
-    /// Its folder, or the log that it was imported from.
+    /// Its folder, or the log that it was imported from, with the pair that is viewed.
     pub fn name(&self) -> String {
-        match self.place == self.samples.display().to_string() {
-            true => self.directory.display().to_string(),
-            false => self.place.clone(),
+        match self.place.strip_prefix(&self.samples.display().to_string()) {
+            Some(pair) => format!("{}{pair}", self.directory.display()),
+            None => self.place.clone(),
         }
     }
 
@@ -182,6 +183,58 @@ impl Recording {
             clock_factor: None,
             ..self
         }
+    }
+
+    /// The triads that its samples have, by number and kind: `gyro`, `accel`, `mag`, `gyro2` and so on.
+    pub fn triads(&self) -> Vec<TriadName> {
+        self.columns.triads().collect()
+    }
+
+    /// The same samples with the triads `gyroN` and `accelN` in the places of `gyro` and `accel`, where N is `number`. One of the two may be missing.
+    ///
+    /// Times, steps, temperature and known inputs stay; the other triads are left out, and with them what the manifest says of the first pair: where
+    /// its readings saturate, and how it was set.
+    ///
+    /// # Errors
+    /// There is neither of the two.
+    pub fn pair(&self, number: u8) -> Result<Recording> {
+        if number == 1 {
+            return Ok(self.clone());
+        }
+        let [gyro, accel] =
+            [TriadKind::Gyro, TriadKind::Accel].map(|kind| TriadName { kind, number });
+        let triads = self.triads();
+        if !triads.contains(&gyro) && !triads.contains(&accel) {
+            let names: Vec<String> = triads.iter().map(ToString::to_string).collect();
+            let problem = format!("it has neither {gyro} nor {accel}");
+            let remedy = format!(
+                "it has {}: choose the number of one of these",
+                names.join(", ")
+            );
+            return Err(Error::new(&self.place, problem, remedy));
+        }
+        let source = match &self.source {
+            Samples::Csv(file) => Samples::Csv(file.of_pair(number)),
+            Samples::Parquet(file, layout) => {
+                Samples::Parquet(file.clone(), layout.of_pair(number))
+            }
+            Samples::InMemory(samples) => {
+                let samples = samples.clone();
+                Samples::InMemory(Arc::new(PairInMemory { samples, number }))
+            }
+        };
+        let mut manifest = self.manifest.clone();
+        manifest.rails = None;
+        if let Some(recorded) = &mut manifest.recorded {
+            recorded.sensors = None;
+        }
+        Ok(Recording {
+            manifest,
+            columns: self.columns.of_pair(number),
+            source,
+            place: format!("{}, pair {number}", self.place),
+            ..self.clone()
+        })
     }
 
     /// Number of rows, if it is known without reading; CSV does not contain it.
@@ -231,8 +284,9 @@ impl Recording {
     fn written_columns(&self, columns: &[Column], progress: impl Fn(f64)) -> Result<Vec<Vec<f64>>> {
         match &self.source {
             Samples::Csv(_) => {}
-            Samples::Parquet(file, _) => {
-                return columns.iter().map(|column| file.column(*column)).collect();
+            Samples::Parquet(file, layout) => {
+                let column = |column: &Column| file.column(layout, *column);
+                return columns.iter().map(column).collect();
             }
             Samples::InMemory(samples) => {
                 let column = |column: &Column| {

@@ -42,6 +42,25 @@ impl TriadName {
     /// Highest number of a triad.
     pub const MOST: u8 = 64;
 
+    /// The first gyro.
+    pub const GYRO: Self = Self::first(TriadKind::Gyro);
+    /// The first accelerometer.
+    pub const ACCEL: Self = Self::first(TriadKind::Accel);
+    /// The first magnetometer.
+    pub const MAG: Self = Self::first(TriadKind::Mag);
+
+    /// All names, by number and kind: `gyro`, `accel`, `mag`, `gyro2` and so on.
+    pub fn all() -> impl Iterator<Item = Self> {
+        let numbers = 1..=Self::MOST;
+        numbers.flat_map(|number| TriadKind::ALL.map(|kind| Self { kind, number }))
+    }
+
+    /// Its place in [`Self::all`].
+    pub(crate) fn place(self) -> usize {
+        let number = usize::from(self.number.clamp(1, Self::MOST));
+        (number - 1) * TriadKind::ALL.len() + self.kind as usize
+    }
+
     /// The first of a kind.
     pub const fn first(kind: TriadKind) -> Self {
         Self { kind, number: 1 }

@@ -48,7 +48,7 @@ impl ParquetFile {
         match self.0 {}
     }
 
-    pub fn column(&self, _: Column) -> Result<Vec<f64>> {
+    pub fn column(&self, _: &Layout, _: Column) -> Result<Vec<f64>> {
         match self.0 {}
     }
 }

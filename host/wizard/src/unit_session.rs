@@ -208,6 +208,7 @@ impl UnitSession {
             gyro: true,
             accel: true,
             reference: [table; 6],
+            ..Columns::default()
         };
         let mut manifest = Manifest::new(
             unit.name.clone(),

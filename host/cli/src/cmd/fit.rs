@@ -17,8 +17,10 @@ use mimu::result::sessions::SessionsResult;
 use mimu::sessions::class::PartClass;
 use mimu::sessions::{Sessions, fit_determined};
 use mimu::signal::stillness::DwellSearch;
-use mimu_recording::ReferenceError;
+use mimu_body::result::BodyResult;
+use mimu_body::{Body, Options as BodyOptions};
 use mimu_recording::error::{Error, Result};
+use mimu_recording::{Recording, ReferenceError};
 use serde::Serialize;
 
 use crate::arguments::{
@@ -27,7 +29,7 @@ use crate::arguments::{
 };
 use crate::hint::OF_A_LOG;
 use crate::output::{Results, now};
-use crate::reading::{LogArgs, read_samples_or_means};
+use crate::reading::{LogArgs, read_with_samples};
 use crate::report;
 use crate::report::budget::budget_text;
 use crate::report::data_sheet::{WithDataSheet, data_sheet_text};
@@ -69,6 +71,9 @@ pub struct FitArgs {
     /// With it six poses by hand suffice. If the data contradict it, a warning says so, and the prior is given up for the sensor.
     #[arg(long, value_name = "FILE", conflicts_with = "class")]
     prior: Option<PathBuf>,
+    /// Size of the Earth's field at the place, µT, for a recording with a magnetometer; without it the field counts as 1
+    #[arg(long, value_name = "UT")]
+    field: Option<f64>,
     #[command(flatten)]
     part: PartArgs,
     /// List the dwells
@@ -242,13 +247,14 @@ impl FitMade {
 }
 
 /// Reads and prepares a recording as the arguments say.
-fn prepared(args: &FitArgs, recording: &Path) -> Result<Prepared> {
+fn prepared(args: &FitArgs, recording: &Path) -> Result<(Prepared, Option<Recording>)> {
     let outputs = [args.output.as_deref(), args.json.file()];
     let inputs = [args.noise.file.as_deref(), args.prior.as_deref()];
     let search = args.still.search();
-    let prepared = read_samples_or_means(recording, &args.log, search, &outputs, &inputs)?;
+    let (prepared, samples) = read_with_samples(recording, &args.log, search, &outputs, &inputs)?;
     args.writing.check(args.output.as_deref())?;
-    args.complete(prepared, args.noise.read()?.as_ref())
+    let prepared = args.complete(prepared, args.noise.read()?.as_ref())?;
+    Ok((prepared, samples))
 }
 
 /// Fits a recording. After a refusal the user first needs the list of dwells; the error line comes last.
@@ -266,9 +272,14 @@ fn fitted(
 }
 
 fn one(args: &FitArgs, recording: &Path) -> Result<Status> {
-    let prepared = prepared(args, recording)?;
+    let (prepared, samples) = prepared(args, recording)?;
     let place = prepared.place.clone();
     let fitted = fitted(args, prepared, fit_or_faces)?;
+    let options = BodyOptions {
+        field_ut: args.field,
+    };
+    let body = samples.map(|samples| Body::of(&samples, &fitted, &options));
+    let body = body.transpose()?.flatten();
     let result = FitResult::of(&fitted);
     let mut text = report::fit_text(&result, args.verbose.verbose);
     text += &budget_text(&result);
@@ -278,12 +289,40 @@ fn one(args: &FitArgs, recording: &Path) -> Result<Status> {
             text += &format!("prior: {}, {used}\n", path.display());
         }
     }
+    let raw = result.raw_unit;
+    let more = body.as_ref().map(|body| BodyResult::of(body, raw));
+    text.extend(more.as_ref().map(report::body_text));
     if args.dwells {
         text.push('\n');
         text.push_str(&report::dwell_table(&result.dwells));
     }
-    let made = || Calibration::of(&fitted, &[], &now());
-    write(args, text, &result, &result.judgement, &place, made)
+    let made = || {
+        let mut made = Calibration::of(&fitted, &[], &now())?;
+        made.body = body.iter().flat_map(|body| body.tables(raw)).collect();
+        Ok(made)
+    };
+    match more {
+        None => write(args, text, &result, &result.judgement, &place, made),
+        Some(more) => {
+            let all = with_body(&result, &more);
+            write(args, text, &all, &result.judgement, &place, made)
+        }
+    }
+}
+
+/// The result of a fit with the further triads among its sensors.
+fn with_body(result: &FitResult, more: &BodyResult) -> serde_json::Value {
+    let mut all = serde_json::json!(result);
+    let mut more = serde_json::json!(more);
+    if let (Some(sensors), Some(further)) = (
+        all["sensors"].as_object_mut(),
+        more["sensors"].as_object_mut(),
+    ) {
+        sensors.append(further);
+    }
+    all["body"] = more["body"].take();
+    all["refused"] = more["refused"].take();
+    all
 }
 
 /// One calibration of several sessions.
@@ -291,7 +330,7 @@ fn several(args: &FitArgs) -> Result<Status> {
     let fits: Result<Vec<Fit>> = args
         .recordings
         .iter()
-        .map(|recording| fitted(args, prepared(args, recording)?, fit_determined))
+        .map(|recording| fitted(args, prepared(args, recording)?.0, fit_determined))
         .collect();
     let sessions = Sessions::combine(fits?, args.class())?;
     let combined = Calibration::of_sessions(&sessions, &now())?;

@@ -2,7 +2,7 @@
 
 use maud::{Markup, html};
 use mimu::quantity::{plural, significant};
-use mimu_recording::{ImportSummary, TimeSummary};
+use mimu_recording::{ImportSummary, TimeSummary, TriadName};
 
 use super::page::all_warnings;
 use super::terminal::text;
@@ -50,6 +50,9 @@ pub fn import_text(summary: &ImportSummary) -> String {
             } } }
             @for line in &summary.taken { p { (line) } }
             @if !summary.taken.is_empty() { p data-head="the same in full: " { "mimu import " (said.join(" ")) " -o DIR" } }
+            @if summary.triads.iter().any(|t| ![TriadName::GYRO, TriadName::ACCEL].contains(t)) { p data-head="triads: " {
+                (summary.triads.iter().map(ToString::to_string).collect::<Vec<_>>().join(", "))
+            } }
             ul class="lines" data-head="" {
                 @for time in &summary.time { li { (time.file) ": " (time_of(time)) } }
                 @for note in &summary.notes { li { (note) } }

@@ -54,6 +54,7 @@ impl Run {
             gyro: true,
             accel: true,
             reference: known.as_ref().map_or([false; 6], Known::columns),
+            ..Columns::default()
         };
         Ok(Self {
             growing: Growing::create(&options.directory, columns, manifest)?,

@@ -185,7 +185,7 @@ impl Condensed {
     ///
     /// Errors: a column is neither empty nor as long as the times.
     pub fn of(samples: &Batch, rate_hz: f64, integrate: bool) -> Result<Self> {
-        let lengths = Column::all().map(|column| {
+        let lengths = Column::fixed().map(|column| {
             let length = samples
                 .values(column)
                 .map_or(samples.step.len(), <[f64]>::len);

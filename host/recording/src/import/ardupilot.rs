@@ -15,6 +15,7 @@ use super::readings::{Choice, LogFormat, Readings};
 use super::rotation::{Correction, listed, orientation};
 use crate::columns::Column;
 use crate::error::{Argument, Error, Result};
+use crate::triad_name::{TriadKind, TriadName};
 use records::{Record, Records};
 
 /// Logs of ArduPilot.
@@ -25,8 +26,14 @@ pub(super) const BIN: LogFormat = LogFormat {
     read,
 };
 
-/// Messages that are read. [`Log::chosen`] prefers `GYR` with `ACC`, then `IMU`.
+/// Messages of gyro and accelerometer. [`Log::inertial`] prefers `GYR` with `ACC`, then `IMU`.
 const MESSAGES: [&str; 3] = ["IMU", "GYR", "ACC"];
+/// Messages of magnetometers, in mG, and the size of this unit in µT. Their readings are after ArduPilot's calibration: which parts of it apply depends on
+/// more than the log has, and it is affine, so that another one absorbs it.
+const MAG: &str = "MAG";
+const MILLIGAUSS_UT: f64 = 0.1;
+/// Longest time between a magnetometer's sample and its message, µs.
+const LATEST_US: f64 = 1e6;
 
 /// Readings of one sensor in messages of one kind.
 #[derive(Default)]
@@ -45,6 +52,8 @@ struct Samples {
 struct Log {
     /// By message and number of the sensor, counted from 0.
     samples: BTreeMap<(&'static str, u32), Samples>,
+    /// Of magnetometers by number, with its row's stamp in ns and readings in µT.
+    mags: BTreeMap<u32, Vec<(i64, [f64; 3])>>,
     parameters: BTreeMap<String, f64>,
     /// Whether parameters have changed since the corrections were computed.
     stale: bool,
@@ -94,13 +103,18 @@ impl Log {
             Some(kind) => (kind, name[kind.len()..].parse().ok()),
             None => (name, None),
         };
-        let Some(kind) = MESSAGES.into_iter().find(|message| *message == kind) else {
-            return;
-        };
         let instance = record.number("I").map(|i| i as u32);
         let instance = instance
             .or(number.map(|n: u32| n.saturating_sub(1)))
             .unwrap_or(0);
+        if kind == MAG {
+            let all = self.mags.entry(instance).or_default();
+            all.extend(mag_of(record));
+            return;
+        }
+        let Some(kind) = MESSAGES.into_iter().find(|message| *message == kind) else {
+            return;
+        };
         if self.stale {
             self.corrections.clear();
             self.stale = false;
@@ -128,14 +142,52 @@ impl Log {
         }
     }
 
+    /// The readings that `choice` selects, and those of all magnetometers.
     fn chosen(&self, path: &Path, choice: Choice<'_>) -> Result<Vec<Readings>> {
-        let of_instance = |instance: u32| -> Vec<&'static str> {
-            let kinds = self.samples.keys().filter(|(_, i)| *i == instance);
-            kinds.map(|(kind, _)| *kind).collect()
-        };
-        let instances = self.samples.keys().map(|(_, instance)| *instance);
-        let instance = choice.instance_of(path, instances, &self.listed())?;
-        let there = of_instance(instance);
+        let mut there: BTreeMap<u32, [bool; 2]> = BTreeMap::new();
+        for (kind, instance) in self.samples.keys() {
+            let has = there.entry(*instance).or_default();
+            has[0] |= *kind != "ACC";
+            has[1] |= *kind != "GYR";
+        }
+        let mut all = Vec::new();
+        let instances = choice.instances_of(path, &there, &self.listed())?;
+        for (number, instance) in (1..=TriadName::MOST).zip(instances) {
+            match self.inertial(path, choice, instance, number) {
+                // A topic that only some of all sensors have.
+                Err(_) if number > 1 => {}
+                readings => all.extend(readings?),
+            }
+        }
+        let kind = TriadKind::Mag;
+        all.extend(
+            (1..=TriadName::MOST)
+                .zip(&self.mags)
+                .map(|(number, (instance, rows))| {
+                    let mut readings = Readings::of_triads([TriadName { kind, number }]);
+                    for (stamp_ns, values) in rows {
+                        readings.push(*stamp_ns, *values);
+                    }
+                    let count = rows.len();
+                    readings.notes.push(format!(
+                "{count} messages {MAG} of instance {instance}, after ArduPilot's calibration"
+            ));
+                    readings.sorted()
+                }),
+        );
+        Ok(all)
+    }
+
+    /// The readings of the sensor `instance`, which is the pair `number` of the recording.
+    fn inertial(
+        &self,
+        path: &Path,
+        choice: Choice<'_>,
+        instance: u32,
+        number: u8,
+    ) -> Result<Vec<Readings>> {
+        let kinds = self.samples.keys().filter(|(_, i)| *i == instance);
+        let there: Vec<&str> = kinds.map(|(kind, _)| *kind).collect();
         let both_fast = there.contains(&"GYR") && there.contains(&"ACC");
         let topic = choice.topic_of(path, &[&["GYR", "ACC"]])?;
         let kinds: &[&str] = match topic {
@@ -161,7 +213,7 @@ impl Log {
         found.sort_by_key(|(_, samples)| std::cmp::Reverse(samples.stamps_ns.len()));
         let mut all: Vec<Readings> = found
             .into_iter()
-            .map(|(kind, samples)| samples.readings(kind, instance))
+            .map(|(kind, samples)| samples.readings(kind, instance, number))
             .collect();
         let thermal = format!("INS_TCAL{}_ENABLE", instance + 1);
         if self.parameters.get(&thermal) == Some(&1.0)
@@ -223,12 +275,15 @@ impl Samples {
         Some(())
     }
 
-    fn readings(&self, kind: &str, instance: u32) -> Readings {
+    fn readings(&self, kind: &str, instance: u32, number: u8) -> Readings {
         let sensors = [&self.gyro, &self.accel];
-        let has = |sensor: usize| !sensors[sensor].is_empty();
-        let columns = (0..6).filter(|c| has(c / 3)).map(Column::Raw);
-        // A sensor without a thermometer reports 0.
-        let temperature = self.temp_c.iter().any(|t| t.is_finite() && *t != 0.0);
+        let both = [TriadKind::Gyro, TriadKind::Accel].into_iter().zip(sensors);
+        let has = both.filter(|(_, all)| !all.is_empty());
+        let triads = has.map(|(kind, _)| TriadName { kind, number });
+        let columns = triads.flat_map(|t| [0, 1, 2].map(|axis| Column::of(t, axis)));
+        // A sensor without a thermometer reports 0, and a recording has the temperature of its first pair.
+        let measured = self.temp_c.iter().any(|t| t.is_finite() && *t != 0.0);
+        let temperature = measured && number == 1;
         let mut readings = Readings::of(
             columns
                 .chain(temperature.then_some(Column::Temperature))
@@ -268,6 +323,19 @@ impl Samples {
         }
         readings
     }
+}
+
+/// Stamp, ns, and readings, µT, of a magnetometer's message. Since 4.0 `S` has the lower 32 bits of the time of the sample, which may be a tenth of a second
+/// before that of the message.
+fn mag_of(record: &Record<'_>) -> Option<(i64, [f64; 3])> {
+    let milliseconds = || Some(1e3 * record.number("TimeMS")?);
+    let logged_us = record.number("TimeUS").or_else(milliseconds)?;
+    let sampled = record.number("S").filter(|sampled| *sampled > 0.0);
+    let late_us = sampled.map(|sampled| (logged_us - sampled).rem_euclid(2_f64.powi(32)));
+    let late_us = late_us.filter(|late| *late < LATEST_US).unwrap_or(0.0);
+    let axis = |name: &str| Some(MILLIGAUSS_UT * record.number(name)?);
+    let values = [axis("MagX")?, axis("MagY")?, axis("MagZ")?];
+    Some((((logged_us - late_us) * 1e3).round() as i64, values))
 }
 
 /// ArduPilot's calibration of gyro and accelerometer number `instance`; `None` if the log does not contain it.

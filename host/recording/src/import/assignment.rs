@@ -41,9 +41,9 @@ const AVERAGED_COLUMNS: [&str; 6] = [
 ];
 
 impl Role {
-    /// Every role there is.
+    /// Every role except those of further triads.
     pub fn all() -> impl Iterator<Item = Role> {
-        Column::all()
+        Column::fixed()
             .map(Role::Column)
             .chain([Role::Sample, Role::Nanoseconds, Role::Averaged(None)])
             .chain((0..6).map(Role::Deviation))
@@ -64,7 +64,9 @@ impl Role {
 
     /// The role with this name.
     pub fn from_name(name: &str) -> Option<Role> {
-        Role::all().find(|role| role.name() == name)
+        let mut all = Role::all();
+        let further = || Column::from_name(name).map(Role::Column);
+        all.find(|role| role.name() == name).or_else(further)
     }
 }
 
@@ -109,7 +111,10 @@ impl FromStr for ColumnList {
                             "{} is not a column of a recording",
                             shorten(known.as_bytes())
                         ),
-                        format!("write - to skip a column, or one of {}", all.join(", ")),
+                        format!(
+                            "write - to skip a column, or one of {}, or that of a further triad, such as mag_x or gyro2_x",
+                            all.join(", ")
+                        ),
                     )
                 })?),
             };
@@ -166,6 +171,7 @@ mod tests {
             "t_s,accel_x,-,accel_y",
             "gyro_x=wx,t_s=time (ms)",
             "sample,step",
+            "t_s,mag_x,mag_y,mag_z,gyro2_x,accel12_z",
         ] {
             assert_eq!(text.parse::<ColumnList>().unwrap().to_string(), text);
         }

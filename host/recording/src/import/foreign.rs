@@ -73,6 +73,8 @@ pub(super) struct ForeignFile {
     clock: Option<Clock>,
     before: Row,
     values: Vec<Cell>,
+    /// How many of the values, the last ones, are of further triads.
+    further: usize,
     empty_zero_temperatures: bool,
     skip_empty: bool,
     /// Counts and checks of the readings.
@@ -207,13 +209,17 @@ impl ForeignFile {
                     conversion: how.conversion(*column),
                 }),
             });
-        let values: Vec<Cell> = numbers.collect();
+        let mut values: Vec<Cell> = numbers.collect();
+        // Those of further triads last, see `Row::further`.
+        let is_further = |cell: &Cell| matches!(cell.column, Column::More(..));
+        values.sort_by_key(is_further);
         Ok(ForeignFile {
             path: path.to_owned(),
             seen: Plausibility::new(
                 values.iter().map(|cell| cell.column),
                 how.log.trust_readings,
             ),
+            further: values.iter().copied().filter(|cell| is_further(cell)).count(),
             values,
             empty_zero_temperatures: how.empty_zero_temperatures,
             skip_empty: how.skip_empty,
@@ -241,6 +247,11 @@ impl ForeignFile {
     /// Columns with numbers, in the order of [`Row::values`].
     pub fn columns(&self) -> impl Iterator<Item = Column> + '_ {
         self.values.iter().map(|cell| cell.column)
+    }
+
+    /// Whether it has readings of further triads alone. Its rows then fill cells of the recording, and decide about none of its rows.
+    pub fn is_further(&self) -> bool {
+        !self.values.is_empty() && self.further == self.values.len()
     }
 
     /// Rows a second; not a number before its times are known.
@@ -417,6 +428,7 @@ impl ForeignFile {
             ));
         }
         row.values.clear();
+        row.further = self.further;
         for cell in &self.values {
             let number_in_file = self.cells.numbers[cell.at];
             let value = cell.conversion.reading(number_in_file).map_err(|refusal| {

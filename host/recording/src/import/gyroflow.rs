@@ -1,8 +1,8 @@
 //! Logs of cameras and gyro loggers for Gyroflow (`.gcsv`).
 //!
 //! Text in cells: a first line with the format's name, lines `key,value`, the names of the columns (`t,gx,gy,gz,ax,ay,az`), then the rows. The header
-//! has the units: `t tscale` is in s (0.001 without it), `g gscale` in rad/s, `a ascale` in g. Axes are those of the logger's sensor; `orientation`
-//! says how Gyroflow turns them into the camera's, and is left to Gyroflow. A magnetometer may follow and is not read.
+//! has the units: `t tscale` is in s (0.001 without it), `g gscale` in rad/s, `a ascale` in g, `m mscale` of a magnetometer in gauss. Axes are those of
+//! the logger's sensor; `orientation` says how Gyroflow turns them into the camera's, and is left to Gyroflow.
 //!
 //! Source: docs.gyroflow.xyz, "gcsv format" 1.3; telemetry-parser 0.2.6, src/gyroflow/mod.rs, which reads the same names and defaults.
 
@@ -13,8 +13,8 @@ use std::path::Path;
 
 use super::decimal::Decimal;
 use super::readings::{Choice, LogFormat, Readings};
-use crate::columns::Column;
 use crate::error::{Argument, Error, Result};
+use crate::triad_name::TriadName;
 
 /// First lines of the format, the second without a maker's name.
 const TITLES: [&str; 2] = ["GYROFLOW IMU LOG", "CAMERA IMU LOG"];
@@ -22,8 +22,10 @@ const TITLES: [&str; 2] = ["GYROFLOW IMU LOG", "CAMERA IMU LOG"];
 const TSCALE: f64 = 1e-3;
 /// What the format calls g.
 const GRAVITY: f64 = 9.80665;
-/// Columns after the time. The accelerometer may be missing.
-const NAMES: [&str; 6] = ["gx", "gy", "gz", "ax", "ay", "az"];
+/// Gauss in µT.
+const GAUSS_UT: f64 = 100.0;
+/// Columns after the time. The accelerometer or the magnetometer may be missing.
+const NAMES: [&str; 9] = ["gx", "gy", "gz", "ax", "ay", "az", "mx", "my", "mz"];
 
 /// Logs of Gyroflow.
 pub(super) const GCSV: LogFormat = LogFormat {
@@ -49,8 +51,10 @@ struct Log {
     readings: Readings,
     /// Factor of the stamps, s.
     tscale: f64,
-    /// Factors of the readings, SI.
+    /// Factors of the readings, SI and µT.
     scales: Vec<f64>,
+    /// How many of them are of gyro and accelerometer. A slower magnetometer may have empty cells.
+    inertial: usize,
     /// Rows without a number for each column, and the first of them, counted from the first line of the file.
     broken: Option<(u64, u64)>,
 }
@@ -91,7 +95,7 @@ impl Log {
     }
 
     fn with_header(path: &Path, header: &BTreeMap<String, String>, names: &[&str]) -> Result<Self> {
-        let has_accel = names.get(4..7) == Some(&NAMES[3..]);
+        let has_accel = names.get(4..7) == Some(&NAMES[3..6]);
         if names.get(1..4) != Some(&NAMES[..3]) {
             let problem = format!(
                 "its columns are {}, but a log of Gyroflow begins with t,gx,gy,gz",
@@ -131,7 +135,17 @@ impl Log {
         if has_accel {
             scales.extend([factor("ascale", "g")? * GRAVITY; 3]);
         }
-        let mut readings = Readings::of((0..scales.len()).map(Column::Raw).collect());
+        let inertial = scales.len();
+        let mut triads = vec![TriadName::GYRO];
+        triads.extend(has_accel.then_some(TriadName::ACCEL));
+        if has_accel
+            && names.get(7..10) == Some(&NAMES[6..])
+            && let Some(gauss) = number("mscale")?
+        {
+            scales.extend([gauss * GAUSS_UT; 3]);
+            triads.push(TriadName::MAG);
+        }
+        let mut readings = Readings::of_triads(triads);
         let text = |key: &str| header.get(key).map_or("none", String::as_str);
         readings.notes.push(format!(
             "log of Gyroflow by {}; axes are those of its sensor, before Gyroflow's orientation ({})",
@@ -147,6 +161,7 @@ impl Log {
             readings,
             tscale: number("tscale")?.unwrap_or(TSCALE),
             scales,
+            inertial,
             broken: None,
         })
     }
@@ -157,13 +172,12 @@ impl Log {
                 .ok()
                 .filter(|v| v.is_finite())
         };
-        let numbers: Option<Vec<f64>> = cells
-            .iter()
-            .take(1 + self.scales.len())
-            .map(number)
-            .collect();
+        let numbers: Option<Vec<f64>> = cells.iter().take(1 + self.inertial).map(number).collect();
         match numbers {
-            Some(numbers) if numbers.len() == 1 + self.scales.len() => {
+            Some(mut numbers) if numbers.len() == 1 + self.inertial => {
+                let further = 1 + self.inertial..1 + self.scales.len();
+                let cell = |at: usize| cells.get(at).and_then(number).unwrap_or(f64::NAN);
+                numbers.extend(further.map(cell));
                 let stamp_ns = (numbers[0] * self.tscale * 1e9).round() as i64;
                 let values = numbers[1..].iter().zip(&self.scales);
                 self.readings

@@ -420,10 +420,19 @@ impl Header {
             Some(ColumnList::ByName(wanted)) => wanted.clone(),
             None => {
                 let known = Role::all().map(|role| (role, role.name().to_owned()));
-                let here: Vec<(Role, String)> =
+                let mut here: Vec<(Role, String)> =
                     known.filter(|(_, name)| names.contains(name)).collect();
-                let sensor = |(role, _): &&(Role, String)| {
-                    matches!(role, Role::Column(Column::Raw(_) | Column::Temperature))
+                for name in names {
+                    let column = Column::from_name(name);
+                    let further = column.filter(|c| matches!(c, Column::More(..)));
+                    let new = further.filter(|_| here.iter().all(|(_, known)| known != name));
+                    here.extend(new.map(|column| (Role::Column(column), name.clone())));
+                }
+                let sensor = |(role, _): &&(Role, String)| match role {
+                    Role::Column(column) => {
+                        column.triad().is_some() || *column == Column::Temperature
+                    }
+                    _ => false,
                 };
                 if here.iter().find(sensor).is_none() {
                     return Ok(());

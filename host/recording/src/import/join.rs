@@ -54,8 +54,24 @@ impl Follower {
         }
     }
 
+    /// Appends this file's values at time `t_s` to `values` like [`Self::values_at`]. Where a file of further triads has none, its cells are empty, and no
+    /// row is dropped for them: a magnetometer must not cost readings of gyro and accelerometer.
+    ///
+    /// A logger may write a slow sensor's last reading again in each row. Such readings are kept: without the sensor's own stamps a repeated one cannot be
+    /// told from a new one of the same value.
+    pub fn append_at(&mut self, t_s: f64, values: &mut Vec<f64>) -> Result<Joined> {
+        let joined = self.values_at(t_s, values)?;
+        if !self.file.is_further() {
+            return Ok(joined);
+        }
+        if matches!(joined, Joined::Outside | Joined::Gap) {
+            values.extend(self.file.columns().map(|_| f64::NAN));
+        }
+        Ok(Joined::Exactly)
+    }
+
     /// Appends this file's values at time `t_s` to `values`; times must be asked for in order.
-    pub fn values_at(&mut self, t_s: f64, values: &mut Vec<f64>) -> Result<Joined> {
+    fn values_at(&mut self, t_s: f64, values: &mut Vec<f64>) -> Result<Joined> {
         if !self.started {
             self.started = true;
             self.after = self.read()?;

@@ -4,6 +4,7 @@ use super::first_pass;
 use super::foreign::{ForeignFile, HowToRead};
 use super::join::{Follower, Joined, check_order};
 use super::left_out::LeftOut;
+use super::log::is_log;
 use super::log_options::file_name;
 use super::options::ImportOptions;
 use super::resample::{self, Resampler};
@@ -22,6 +23,10 @@ use crate::writer::Writer;
 
 /// Rows that are written at a time.
 const BATCH: usize = 1 << 14;
+
+/// Slowest further triad of a log that is interpolated, Hz. Autopilots log a magnetometer once a second unless they are told otherwise, and a hand
+/// turns a unit by a right angle in that time.
+const SLOWEST_HZ: f64 = 4.0;
 
 /// A warning if the time stamps have another rate than the given one.
 fn other_rate(times: &Times, given: f64) -> Option<String> {
@@ -119,7 +124,21 @@ impl<'a> Opening<'a> {
         if file.has_time() {
             // Another sensor has its own rate and delays, but the times of both come from one clock.
             let first = self.first_times.as_ref();
-            let times = first_pass::times(path, &how, self.options.log.rate_hz, first)?;
+            let rate_hz = self.options.log.rate_hz.filter(|_| !file.is_further());
+            let may_leave = file.is_further() && is_log(path);
+            let times = match first_pass::times(path, &how, rate_hz, first) {
+                Err(error) if may_leave => {
+                    self.leave_out(&file, &error.refused().problem);
+                    return Ok(file.parts);
+                }
+                Ok(times) if may_leave && times.summary.rate_hz < SLOWEST_HZ => {
+                    let rate_hz = times.summary.rate_hz;
+                    let why = format!("{rate_hz:.3} Hz are too slow to interpolate between");
+                    self.leave_out(&file, &why);
+                    return Ok(file.parts);
+                }
+                times => times?,
+            };
             period_s = times.period_s();
             self.time.push(times.summary.clone());
             file = file.with_times(times);
@@ -128,6 +147,16 @@ impl<'a> Opening<'a> {
         self.followers
             .push(Follower::new(file, period_s, first_period_s));
         Ok(parts)
+    }
+
+    /// Leaves out further triads of a log that cannot be used. The log was imported for its gyro and accelerometer.
+    fn leave_out(&mut self, file: &ForeignFile, why: &str) {
+        let triads = file.columns().filter_map(Column::triad);
+        let mut triads: Vec<String> = triads.map(|(triad, _)| triad.to_string()).collect();
+        triads.dedup();
+        let (place, triads) = (file_name(file.path()), triads.join(", "));
+        self.warnings
+            .push(format!("{place}: {triads} left out: {why}"));
     }
 
     /// Columns of the values, in the order in which the files give them.
@@ -248,6 +277,7 @@ impl JoinedFiles {
                 sample_rate_hz: files.rate_hz,
                 time: files.time,
                 without_accel: !columns.accel,
+                triads: columns.triads().collect(),
                 warnings,
                 ..ImportSummary::default()
             },
@@ -321,7 +351,7 @@ impl JoinedFiles {
     fn join(&mut self, t_s: f64, values: &mut Vec<f64>) -> Result<bool> {
         let mut worst = Joined::Exactly;
         for follower in &mut self.followers {
-            match follower.values_at(t_s, values)? {
+            match follower.append_at(t_s, values)? {
                 Joined::Exactly => {}
                 Joined::Interpolated if worst != Joined::Exactly => {}
                 other => worst = other,

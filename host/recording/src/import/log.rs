@@ -52,7 +52,8 @@ pub(super) fn read(path: &Path, choice: Choice<'_>) -> Result<Vec<Readings>> {
         ));
     };
     let all = (format.read)(path, choice)?;
-    if all.iter().all(|readings| readings.len() == 0) {
+    let mut inertial = all.iter().filter(|readings| !readings.is_further());
+    if inertial.all(|readings| readings.len() == 0) {
         let problem = "the chosen topic or file has no message of an inertial unit";
         return Err(
             Error::new(path.display(), problem, "choose another topic or file")

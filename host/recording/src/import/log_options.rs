@@ -7,6 +7,7 @@ use super::assignment::ColumnList;
 use super::broken::BrokenLimit;
 use super::comment_signs::{CommentSigns, TextFormat};
 use super::decimal::Decimal;
+use super::instance::Instance;
 use super::per_column::{Offset, Scale, TwosComplement, Zero};
 use super::preset::Preset;
 use super::reading_units::ReadingUnits;
@@ -26,7 +27,7 @@ pub struct LogOptions {
     /// Columns of a file from the left (`t_s,accel_x,-`; `-` skips one), or by the names in its header (`gyro_x=wx,t_s=time`); one list for
     /// each file, or several for a file with a sensor in other columns or rows (--where)
     ///
-    /// Names of columns: t_s, step (numbers or labels), temp_c, gyro_x.., accel_x.., ref_rate_x_dps.., ref_force_x_mps2.., and sample, an
+    /// Names of columns: t_s, step (numbers or labels), temp_c, gyro_x.., accel_x.., mag_x.., gyro2_x.., ref_rate_x_dps.., ref_force_x_mps2.., and sample, an
     /// index that gives the time with --rate-hz.
     #[cfg_attr(
         feature = "clap",
@@ -92,9 +93,10 @@ pub struct LogOptions {
     /// sensor_combined), or message of an ArduPilot log (IMU or GYR) [default: the only or the best one]
     #[cfg_attr(feature = "clap", arg(long))]
     pub topic: Vec<String>,
-    /// Sensor of a PX4 or ArduPilot log, counted from 0 [default: the only one]
+    /// Sensor of a PX4 or ArduPilot log, counted from 0, or all: the first that has a gyro and an accelerometer, and the others as gyro2, accel2 and so
+    /// on [default: the only one]
     #[cfg_attr(feature = "clap", arg(long, value_name = "N"))]
-    pub instance: Option<u32>,
+    pub instance: Option<Instance>,
     /// What is known of the input: table (ref_ columns or --inputs), gravity (its magnitude at rest), or turntable-rate (the magnitude of
     /// the rate, as on a record player; needs --rate-dps and --rate-error) [default: gravity, unless there are ref_ columns, --inputs or
     /// --rate-dps]
@@ -116,7 +118,7 @@ pub struct LogOptions {
     /// Error of these rates: half of a 95 % interval, like `0.1%`; no number of dwells reduces it
     #[cfg_attr(feature = "clap", arg(long, value_name = "PERCENT", requires = "rate_dps", value_parser = crate::turntable::rate_error))]
     pub rate_error: Option<f64>,
-    /// Factor for a column, or for gyro or accel: `gyro=0.0174533`
+    /// Factor for a column, or for gyro, accel, mag, gyro2 and the like: `gyro=0.0174533`
     #[cfg_attr(feature = "clap", arg(long, value_name = "COLUMN=FACTOR"))]
     pub scale: Vec<Scale>,
     /// Number added to a column after its factor: `temp_c=36.53`

@@ -5,7 +5,8 @@
 //! something else.
 
 use super::name_words::{TIME, is_in, words};
-use super::unit_names::{is_unit_of_time, is_unit_word};
+use super::unit_names::{is_unit_of_time, is_unit_word, without_field_unit};
+use crate::triad_name::TriadKind;
 
 /// Meaning of a column's name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -18,6 +19,8 @@ pub(super) enum Meaning {
     Gyro(usize),
     /// Axis of the accelerometer.
     Accel(usize),
+    /// Axis of the magnetometer.
+    Mag(usize),
     /// An axis of the sensor that the file is named after.
     Axis(usize),
     /// A thermometer.
@@ -28,7 +31,7 @@ pub(super) enum Meaning {
     Counter,
     /// A known input of a table, by the recording's own name.
     Reference(&'static str),
-    /// Something else that loggers write: a magnetometer, an attitude, a force without gravity.
+    /// Something else that loggers write: an attitude, a force without gravity.
     Other,
 }
 
@@ -39,10 +42,15 @@ const GYRO: &str =
 /// Words of an accelerometer: `linearacceleration` is ROS's, with gravity despite its name, `accelerationincludinggravity` that of browsers, `xl` of ST.
 const ACCEL: &str = "accel acceleration acc acel linearacceleration accelerationincludinggravity beschleunigung force \
     deltavelocity a f ac sf acl xl arss";
-/// What is neither, though it may contain a word of one: magnetometers, attitudes, forces without gravity, satellites, motors.
+/// Words of a magnetometer; the short one only counts alone.
+const MAG: &str = "mag magn magnet magneto magnetic magneticfield magnetometer magfield magnetfeld compass brujula bussola m";
+/// What is left of a magnetometer's name if it has no reading of the field: its offsets, its errors, the field that a filter or a map predicts.
+const NO_FIELD: &str =
+    "offset ofs scale err error innov innovation pred predicted ref earth ned declination itude";
+/// What is neither gyro nor accelerometer, though it may contain a word of one: magnetometers, attitudes, forces without gravity, satellites, motors.
 const OTHER: &str = "mag quat orient euler gravity user linacc lin roll pitch yaw heading angle attitude baro press humid alt lat lon gps vel pos \
     covariance cov variance motor servo setpoint debug volt current flag status valid accuracy bias filtered norm vector";
-/// Letters before an axis that mean no inertial sensor: magnetometer, quaternion, velocity, position, attitude, field.
+/// Letters before an axis that mean no gyro and no accelerometer: magnetometer, quaternion, velocity, position, attitude, field.
 const OTHER_LETTERS: &str = "m q v p h b e u n";
 const NANOSECONDS: &str = "nsec nsecs nanosec nanosecs nanoseconds";
 const TEMPERATURE: &str = "temp temperature tmp";
@@ -73,7 +81,7 @@ fn without_unit(name: &str) -> String {
     }
     bare.push_str(rest);
     // `gyrox rad/s`
-    let kept: Vec<&str> = bare
+    let kept: Vec<&str> = without_field_unit(&bare)
         .split_whitespace()
         .filter(|word| !is_unit_word(word))
         .collect();
@@ -100,6 +108,12 @@ fn sensor(stem: &str) -> Option<fn(usize) -> Meaning> {
         (None, Some(rest)) if !is_other(&rest) => Some(Meaning::Accel),
         // `accelRate`
         (Some(_), Some(rest)) if rest == "rate" => Some(Meaning::Accel),
+        (None, None) => {
+            let unlike =
+                |rest: &str| is_other(rest) || NO_FIELD.split(' ').any(|w| rest.contains(w));
+            let is_mag = is_in(MAG, stem) || longest(MAG).is_some_and(|rest| !unlike(&rest));
+            if is_mag { Some(Meaning::Mag) } else { None }
+        }
         _ => None,
     }
 }
@@ -208,6 +222,52 @@ pub(super) fn meaning(name: &str) -> Meaning {
         whole if is_in(TIME, whole) || is_in(TIME, &all.concat()) => Meaning::Time,
         _ if is_short_time(&all) || essential.iter().any(is_time) => Meaning::Time,
         _ => Meaning::Other,
+    }
+}
+
+/// An axis of a triad, by the name of its column.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct AxisName {
+    /// What the triad measures.
+    pub kind: TriadKind,
+    /// Index of the axis.
+    pub axis: usize,
+    /// The numbers in the name that tell one of several sensors from another: `1` of `gx1`, `0` of `imu0.accel.x`.
+    pub number: String,
+    /// The name without numbers. Sensors of one logger differ in nothing else.
+    pub bare: String,
+}
+
+impl AxisName {
+    /// By `name`; `None` if it is no axis of a known triad.
+    pub fn of(name: &str) -> Option<Self> {
+        let (kind, axis) = match meaning(name) {
+            Meaning::Gyro(axis) => (TriadKind::Gyro, axis),
+            Meaning::Accel(axis) => (TriadKind::Accel, axis),
+            Meaning::Mag(axis) => (TriadKind::Mag, axis),
+            _ => return None,
+        };
+        let is_digits = |word: &String| word.chars().all(|c| c.is_ascii_digit());
+        let words = words(&without_unit(name.trim()));
+        // `m_s2`, `mps2`
+        let of_unit = |k: usize| k > 0 && ["s", "ms", "mps"].contains(&words[k - 1].as_str());
+        let digits = (0..words.len()).filter(|k| is_digits(&words[*k]) && !of_unit(*k));
+        let mut numbers: Vec<&str> = digits.map(|k| words[k].as_str()).collect();
+        let bare: Vec<&str> = words
+            .iter()
+            .filter(|w| !is_digits(w))
+            .map(String::as_str)
+            .collect();
+        // `gyro2[0]`: the last number is the axis.
+        if axis_of(&bare.iter().map(ToString::to_string).collect::<Vec<_>>()).is_none() {
+            numbers.pop();
+        }
+        Some(Self {
+            kind,
+            axis,
+            number: numbers.join("."),
+            bare: bare.join("."),
+        })
     }
 }
 
@@ -342,6 +402,19 @@ mod tests {
             ("roll_rate", Meaning::Gyro(0)),
             ("pitchspeed", Meaning::Gyro(1)),
             ("YawRate (deg/s)", Meaning::Gyro(2)),
+            ("mag_x", Meaning::Mag(0)),
+            ("magX", Meaning::Mag(0)),
+            ("Mx", Meaning::Mag(0)),
+            ("my", Meaning::Mag(1)),
+            ("Mag_Z", Meaning::Mag(2)),
+            ("MagnetometerY", Meaning::Mag(1)),
+            ("Magnetic field x (µT)", Meaning::Mag(0)),
+            ("magnetic_field.z", Meaning::Mag(2)),
+            ("magADC[1]", Meaning::Mag(1)),
+            ("compass_y", Meaning::Mag(1)),
+            ("mx_uT", Meaning::Mag(0)),
+            ("magn_x [mG]", Meaning::Mag(0)),
+            ("mag2_x", Meaning::Mag(0)),
         ] {
             assert_eq!(meaning(name), wanted, "{name}: {:?}", words(name));
         }
@@ -375,11 +448,12 @@ mod tests {
             ("Temp (°C)", Meaning::Temperature),
             ("label", Meaning::Step),
             ("step", Meaning::Step),
-            ("mag_x", Meaning::Other),
+            ("mag_offset_x", Meaning::Other),
+            ("mag_bias_y", Meaning::Other),
+            ("magnitude", Meaning::Other),
             ("qw", Meaning::Other),
             ("roll", Meaning::Other),
             ("roll_rate_setpoint", Meaning::Other),
-            ("Mx", Meaning::Other),
             ("orientation.x", Meaning::Other),
             ("userAcceleration.x", Meaning::Other),
             ("gravity.x", Meaning::Other),
@@ -395,6 +469,29 @@ mod tests {
         ] {
             assert_eq!(meaning(name), wanted, "{name}: {:?}", words(name));
         }
+    }
+
+    #[test]
+    fn numbers_of_sensors_are_told_from_axes_and_units() {
+        for (name, number, bare) in [
+            ("gx1", "1", "gx"),
+            ("gx", "", "gx"),
+            ("imu0.accel.x", "0", "imu.accel.x"),
+            ("gyro2[0]", "2", "gyro"),
+            ("gyroADC[1]", "", "gyro.adc"),
+            ("accel2_x_m_s2", "2", "accel.x.m.s"),
+            ("accel_y_mps2", "", "accel.y.mps"),
+            ("Gyro X 2 (deg/s)", "2", "gyro.x"),
+            ("mag3_z", "3", "mag.z"),
+        ] {
+            let axis = AxisName::of(name).unwrap();
+            assert_eq!(
+                (axis.number.as_str(), axis.bare.as_str()),
+                (number, bare),
+                "{name}"
+            );
+        }
+        assert_eq!(AxisName::of("temp2"), None);
     }
 
     #[test]

@@ -7,6 +7,7 @@ use std::str::FromStr;
 use crate::cell::shorten;
 use crate::columns::{Column, of_sensor};
 use crate::error::{Error, Result};
+use crate::triad_name::TriadName;
 
 /// What the number of a [`PerColumn`] is.
 pub trait Meaning {
@@ -24,7 +25,7 @@ pub trait Meaning {
     fn fits(number: f64) -> bool;
 }
 
-/// A number for a column, or for the three raw columns of `gyro` or `accel`.
+/// A number for a column, or for the three columns of a triad: `gyro`, `accel`, `mag`, `gyro2`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PerColumn<M> {
     target: String,
@@ -57,7 +58,7 @@ pub struct Code;
 impl Meaning for Factor {
     const PLACE: &'static str = "scale";
     const WANTED: &'static str = "a column of numbers with a finite factor other than 0";
-    const REMEDY: &'static str = "write it like gyro=57.2958, for gyro, accel, temp_c, t_s or a single column such as gyro_x";
+    const REMEDY: &'static str = "write it like gyro=57.2958, for gyro, accel, mag, gyro2 and the like, temp_c, t_s or a single column such as gyro_x";
 
     fn takes(column: Column) -> bool {
         column != Column::Step
@@ -90,7 +91,7 @@ impl Meaning for Bits {
         "write it like accel=12, for gyro, accel or a single column such as gyro_x";
 
     fn takes(column: Column) -> bool {
-        matches!(column, Column::Raw(_))
+        column.triad().is_some()
     }
 
     fn fits(number: f64) -> bool {
@@ -105,7 +106,7 @@ impl Meaning for Code {
         "write it like gyro=2048, for gyro, accel or a single column such as gyro_x";
 
     fn takes(column: Column) -> bool {
-        matches!(column, Column::Raw(_))
+        column.triad().is_some()
     }
 
     fn fits(number: f64) -> bool {
@@ -123,12 +124,21 @@ impl<M> PerColumn<M> {
         let own = all.iter().filter(move |one| one.applies_to(column));
         own.map(|one| one.number)
     }
+
+    /// The columns that it is for.
+    fn columns(&self) -> Vec<Column> {
+        match TriadName::parse(&self.target) {
+            Some(triad) => [0, 1, 2].map(|axis| Column::of(triad, axis)).to_vec(),
+            None => Column::from_name(&self.target).into_iter().collect(),
+        }
+    }
 }
 
 impl Scale {
-    /// Whether it holds for readings of a sensor, not only for the time or the temperature.
+    /// Whether it holds for readings of the first gyro or accelerometer, not only for the time, the temperature or a further triad.
     pub fn is_of_readings(&self) -> bool {
-        Column::all().any(|column| matches!(column, Column::Raw(_)) && self.applies_to(column))
+        let mut columns = self.columns().into_iter();
+        columns.any(|column| matches!(column, Column::Raw(_)))
     }
 
     /// The scales of those columns for which `by_hand` has none. If it has some axes of a sensor, the scale is kept for the others.
@@ -136,7 +146,7 @@ impl Scale {
         let free = |column: &Column| Self::given(by_hand, *column).next().is_none();
         let mut beside = Vec::new();
         for scale in scales {
-            let columns: Vec<Column> = Column::all().filter(|c| scale.applies_to(*c)).collect();
+            let columns = scale.columns();
             match columns.iter().all(free) {
                 true => beside.push(scale.clone()),
                 false => beside.extend(columns.into_iter().filter(free).map(|column| Scale {
@@ -156,7 +166,7 @@ impl<M: Meaning> FromStr for PerColumn<M> {
         let parsed = text.split_once('=').and_then(|(target, number)| {
             let (target, number) = (target.trim(), number.trim().parse().ok()?);
             let named = Column::from_name(target).is_some_and(M::takes);
-            let known = named || M::OF_SENSORS && ["gyro", "accel"].contains(&target);
+            let known = named || M::OF_SENSORS && TriadName::parse(target).is_some();
             (known && M::fits(number)).then(|| Self {
                 target: target.to_owned(),
                 number,
@@ -193,11 +203,15 @@ mod tests {
         let zeros: Vec<Zero> = all(&["gyro=512", "accel_z=-3"]);
         let sum = |c| -> f64 { Zero::given(&zeros, Column::Raw(c)).sum() };
         assert_eq!([1, 4, 5].map(sum), [512.0, 0.0, -3.0]);
+        let mag = |axis| Column::of(TriadName::MAG, axis);
+        let scales: Vec<Scale> = all(&["mag=0.1", "mag_y=-1", "mag2=7"]);
+        let product = |column| -> f64 { Scale::given(&scales, column).product() };
+        assert_eq!([0, 1].map(|axis| product(mag(axis))), [0.1, -0.1]);
     }
 
     #[test]
     fn what_names_no_column_or_no_number_is_refused() {
-        for text in ["gyro", "gyro=x", "gyro=0", "mag=1", "step=2", "gyro=inf"] {
+        for text in ["gyro", "gyro=x", "gyro=0", "foo=1", "step=2", "gyro=inf"] {
             assert!(text.parse::<Scale>().is_err(), "{text}");
         }
         for text in ["12", "accel", "accel=1", "accel=33", "temp_c=12", "accel=x"] {

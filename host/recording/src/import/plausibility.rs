@@ -13,6 +13,8 @@ use crate::health::{
 pub(super) struct Plausibility {
     /// Places of the channels among the values of a row.
     places: [Option<usize>; 6],
+    /// Whether there is a channel of gyro or accelerometer.
+    has_raw: bool,
     temperature: Option<usize>,
     zeros: Zeros,
     /// Of both sensors.
@@ -37,6 +39,7 @@ impl Plausibility {
         let has = [&places[..3], &places[3..]].map(|half| half.iter().all(Option::is_some));
         Plausibility {
             places,
+            has_raw: places.iter().any(Option::is_some),
             temperature,
             zeros: Zeros::new(has),
             held: Default::default(),
@@ -52,9 +55,12 @@ impl Plausibility {
             .map(|place| place.map_or(f64::NAN, |place| row.values[place]))
     }
 
-    /// Whether `row` has no reading of gyro and accelerometer.
+    /// Whether `row` has no reading of gyro and accelerometer; of a file with further triads alone, none at all.
     pub fn is_empty(&self, row: &Row) -> bool {
-        self.raw(row).iter().all(|value| value.is_nan())
+        match self.has_raw {
+            true => self.raw(row).iter().all(|value| value.is_nan()),
+            false => row.values.iter().all(|value| value.is_nan()),
+        }
     }
 
     /// Whether `row` is padding of a buffer, or comes from a time when nothing was connected. Other rows are counted and checked; impossible values

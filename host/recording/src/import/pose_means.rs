@@ -19,6 +19,7 @@ use crate::health::impossible_temperature;
 use crate::manifest::{MANIFEST_FILE, Manifest};
 use crate::separator::Separator;
 use crate::staging::Staging;
+use crate::triads::Triads;
 
 /// File of the means in a recording's directory, beside its manifest.
 pub const MEANS_FILE: &str = "means.csv";
@@ -139,18 +140,28 @@ impl Means {
             _ => None,
         });
         let names: Vec<&str> = [Column::Time.name()].into_iter().chain(names).collect();
-        let columns = Layout::from_names(&names, &path.display().to_string())?.columns;
+        let mut columns = Layout::from_names(&names, &path.display().to_string())?.columns;
+        let further: Vec<String> = columns.more.iter().map(|t| t.to_string()).collect();
+        columns.more = Triads::default();
         let mut cells = Cells::default();
         let mut poses = Vec::new();
         while let Some(row) = table.next(&mut cells).map_err(Unreadable::into_error)? {
             let place = table.header.place(row);
             poses.push(pose(&roles, &cells, factors, &columns, &place)?);
         }
+        let mut warnings = table.noticed.warnings;
+        if !further.is_empty() {
+            warnings.push(format!(
+                "{}: {} left out: a table of means has one gyro and one accelerometer",
+                path.display(),
+                further.join(", ")
+            ));
+        }
         Ok(Means {
             poses,
             columns,
             skipped: table.noticed.skipped,
-            warnings: table.noticed.warnings,
+            warnings,
         })
     }
 }
@@ -217,7 +228,9 @@ fn pose(
                     }
                 }
             }
-            Role::Column(Column::Time | Column::Step) | Role::Sample | Role::Nanoseconds => {}
+            Role::Column(Column::Time | Column::Step | Column::More(..))
+            | Role::Sample
+            | Role::Nanoseconds => {}
         }
     }
     let numbers = pose

@@ -198,7 +198,10 @@ impl Preset {
     fn files_in(&self, folder: &Path) -> Result<Vec<PathBuf>> {
         let sets = self.in_folder.iter();
         let mut sets = sets.map(|set| set.iter().map(|file| folder.join(file)).collect());
+        let mut mags = self.mag_in_folder.iter().map(|file| folder.join(file));
+        let mag = mags.find(|file| file.is_file());
         sets.find(|set: &Vec<PathBuf>| set.iter().all(|file| file.is_file()))
+            .map(|set| [set, Vec::from_iter(mag)].concat())
             .ok_or_else(|| {
                 let sets: Vec<String> = self.in_folder.iter().map(|s| s.join(" and ")).collect();
                 let problem = match sets.is_empty() {
@@ -340,12 +343,14 @@ impl Layout {
         list: ColumnList,
         separator: Option<Separator>,
     ) -> Result<ColumnList> {
-        let more = format!("{},{}", self.columns, self.optional);
-        if !self.optional.is_empty()
-            && let Ok(more) = more.parse()
-            && Table::open(path, Some(&more), separator.into(), &[]).is_ok()
-        {
-            return self.timed(path, more, separator);
+        let (mut list, mut columns) = (list, self.columns.to_owned());
+        for group in self.optional {
+            let more = format!("{columns},{group}");
+            if let Ok(parsed) = more.parse()
+                && Table::open(path, Some(&parsed), separator.into(), &[]).is_ok()
+            {
+                (list, columns) = (parsed, more);
+            }
         }
         self.timed(path, list, separator)
     }

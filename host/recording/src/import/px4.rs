@@ -19,6 +19,7 @@ use super::decimal::Decimal;
 use super::readings::{Choice, LogFormat, Readings, guarded};
 use crate::columns::Column;
 use crate::error::{Argument, Error, Result};
+use crate::triad_name::{TriadKind, TriadName};
 use calibration::{Parameters, Sensor};
 use topics::{Combined, Topic, u32_in};
 
@@ -37,6 +38,9 @@ const HEADER: u64 = 16;
 /// The topics that are read.
 const COMBINED: &str = "sensor_combined";
 const SELECTION: &str = "sensor_selection";
+/// The topic of magnetometers, in gauss, and the size of its unit in µT. Before PX4 1.11 its readings are calibrated, which an affine calibration absorbs.
+const MAG: &str = "sensor_mag";
+const GAUSS_UT: f64 = 100.0;
 /// Topics of one sensor each: gyro and accelerometer.
 const RAW: [&str; 2] = ["sensor_gyro", "sensor_accel"];
 const FIFO: [&str; 2] = ["sensor_gyro_fifo", "sensor_accel_fifo"];
@@ -50,6 +54,8 @@ const SPARSE: usize = 4;
 struct Log {
     /// By name and instance.
     topics: BTreeMap<(&'static str, u32), Topic>,
+    /// Magnetometers by instance.
+    mags: BTreeMap<u32, Topic>,
     combined: Combined,
     /// Ids of the gyro and the accelerometer in use, each pair with the number of its first sample in `sensor_combined`.
     selected: Vec<(usize, [u32; 2])>,
@@ -108,6 +114,10 @@ impl Log {
                 let taken = match data.flattened_format.message_name() {
                     COMBINED => self.combined.take(data),
                     SELECTION => self.select(data),
+                    MAG => {
+                        let instance = u32::from(data.multi_id.value());
+                        self.mags.entry(instance).or_default().take(data)
+                    }
                     name => match RAW.into_iter().chain(FIFO).find(|raw| *raw == name) {
                         Some(raw) => {
                             let instance = u32::from(data.multi_id.value());
@@ -146,8 +156,33 @@ impl Log {
         Some(())
     }
 
-    /// The readings that `choice` selects.
+    /// The readings that `choice` selects, and those of all magnetometers.
     fn chosen(&self, path: &Path, choice: Choice<'_>) -> Result<Vec<Readings>> {
+        let mut all = self.inertial(path, choice)?;
+        all.extend(
+            (1..=TriadName::MOST)
+                .zip(&self.mags)
+                .map(|(number, (instance, topic))| {
+                    let triad = TriadName {
+                        kind: TriadKind::Mag,
+                        number,
+                    };
+                    let mut readings = Readings::of_triads([triad]);
+                    for (stamp, values) in topic.stamps_ns.iter().zip(&topic.values) {
+                        readings.push(*stamp, values.map(|gauss| gauss * GAUSS_UT));
+                    }
+                    let (count, named) = (topic.values.len(), topic.named());
+                    readings.notes.push(format!(
+                        "{count} samples of {MAG} instance {instance} ({named})"
+                    ));
+                    readings.sorted()
+                }),
+        );
+        Ok(all)
+    }
+
+    /// The readings of gyro and accelerometer that `choice` selects.
+    fn inertial(&self, path: &Path, choice: Choice<'_>) -> Result<Vec<Readings>> {
         let has = |names: [&str; 2]| self.topics.keys().any(|(name, _)| names.contains(name));
         let combined = self.combined.stamps_ns.len();
         let raw = self
@@ -192,27 +227,44 @@ impl Log {
         }
     }
 
-    /// The topics of gyro and accelerometer, of one instance.
+    /// The topics of gyro and accelerometer, of one instance or of all.
     fn raw_readings(
         &self,
         path: &Path,
         names: [&'static str; 2],
         choice: Choice<'_>,
     ) -> Result<Vec<Readings>> {
-        let of_topics = self.topics.keys();
-        let of_topics = of_topics.filter(|(name, _)| names.contains(name));
-        let instances = of_topics.map(|(_, instance)| *instance);
-        let instance = choice.instance_of(path, instances, &self.listed())?;
+        let mut there: BTreeMap<u32, [bool; 2]> = BTreeMap::new();
+        for (name, instance) in self.topics.keys().filter(|(name, _)| names.contains(name)) {
+            there.entry(*instance).or_default()[usize::from(*name == names[1])] = true;
+        }
+        let instances = choice.instances_of(path, &there, &self.listed())?;
+        let mut all = Vec::new();
+        for (number, instance) in (1..=TriadName::MOST).zip(instances) {
+            all.extend(self.instance_readings(names, instance, number));
+        }
+        Ok(all)
+    }
+
+    /// The topics of gyro and accelerometer of `instance`, which is the pair `number` of the recording.
+    fn instance_readings(
+        &self,
+        names: [&'static str; 2],
+        instance: u32,
+        number: u8,
+    ) -> Vec<Readings> {
         let mut both: Vec<(usize, &'static str, &Topic)> = (0..)
             .zip(names)
             .filter_map(|(sensor, name)| Some((sensor, name, self.topics.get(&(name, instance))?)))
             .collect();
         // The others are interpolated at the times of the first.
         both.sort_by_key(|(_, _, topic)| std::cmp::Reverse(topic.values.len()));
-        let mut all = Vec::new();
+        let mut all: Vec<Readings> = Vec::new();
         for (sensor, name, topic) in &both {
-            let temperature = all.is_empty() && topic.temp_c.iter().any(|t| t.is_finite());
-            let columns = (0..3).map(|axis| Column::Raw(3 * sensor + axis));
+            let first = all.is_empty() && number == 1;
+            let temperature = first && topic.temp_c.iter().any(|t| t.is_finite());
+            let kind = [TriadKind::Gyro, TriadKind::Accel][*sensor];
+            let columns = (0..3).map(|axis| Column::of(TriadName { kind, number }, axis));
             let mut readings = Readings::of(
                 columns
                     .chain(temperature.then_some(Column::Temperature))
@@ -266,7 +318,7 @@ impl Log {
                 "gyro and accelerometer of instance {instance} are on different devices"
             ));
         }
-        Ok(all)
+        all
     }
 
     /// The readings of `sensor_combined`; `sparse`: the raw topics exist, but have too few samples.

@@ -1,16 +1,18 @@
 //! Rows that the readers of logs have read.
 
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 use std::panic::{UnwindSafe, catch_unwind};
 use std::path::Path;
 
 use super::assignment::Role;
 use super::decimal::Decimal;
+use super::instance::Instance;
 use super::table::Cells;
 use super::time::Stamp;
 use crate::ahead::reader_panicked;
 use crate::columns::Column;
 use crate::error::{Argument, Error, Result};
+use crate::triad_name::TriadName;
 
 /// A format of logs.
 pub(super) struct LogFormat {
@@ -29,8 +31,8 @@ pub(super) struct LogFormat {
 pub(super) struct Choice<'a> {
     /// Names of topics or messages: one, or those of two sensors. Without them, the format decides.
     pub topics: &'a [String],
-    /// Number of the sensor among those of one topic.
-    pub instance: Option<u32>,
+    /// Sensor among those of one topic.
+    pub instance: Option<Instance>,
 }
 
 impl<'a> Choice<'a> {
@@ -51,24 +53,33 @@ impl<'a> Choice<'a> {
         }
     }
 
-    /// The instance that is wanted, or the only one of those `there`; `listed` names all.
-    pub fn instance_of(
+    /// The instances that are wanted, or the only one of those `there`, each with what it has of gyro and accelerometer; `listed` names all. The first is
+    /// the pair of a recording: of all, the first that has both.
+    pub fn instances_of(
         &self,
         path: &Path,
-        there: impl Iterator<Item = u32>,
+        there: &BTreeMap<u32, [bool; 2]>,
         listed: &str,
-    ) -> Result<u32> {
-        let there: BTreeSet<u32> = there.collect();
-        let problem = match (self.instance, there.first()) {
-            (None, Some(only)) if there.len() == 1 => return Ok(*only),
-            (Some(wanted), _) if there.contains(&wanted) => return Ok(wanted),
-            (Some(wanted), _) => format!("the log has no instance {wanted}; it has: {listed}"),
+    ) -> Result<Vec<u32>> {
+        let problem = match (self.instance, there.first_key_value()) {
+            (None, Some((only, _))) if there.len() == 1 => return Ok(vec![*only]),
+            (Some(Instance::Number(wanted)), _) if there.contains_key(&wanted) => {
+                return Ok(vec![wanted]);
+            }
+            (Some(Instance::All), Some(_)) => {
+                let mut all: Vec<u32> = there.keys().copied().collect();
+                all.sort_by_key(|instance| there[instance] != [true; 2]);
+                return Ok(all);
+            }
+            (Some(Instance::Number(wanted)), _) => {
+                format!("the log has no instance {wanted}; it has: {listed}")
+            }
             (None, Some(_)) => format!("the log has several sensors: {listed}"),
-            (None, None) => format!("the log has {listed}"),
+            (None | Some(Instance::All), None) => format!("the log has {listed}"),
         };
         let remedy = match there.is_empty() {
             true => "log the messages of the inertial sensors",
-            false => "choose one of the instances",
+            false => "choose one of the instances, or all",
         };
         let error = Error::new(path.display(), problem, remedy);
         Err(error.about(Argument::Topic).about(Argument::Instance))
@@ -103,10 +114,40 @@ impl Readings {
         Self::of((0..6).map(Column::Raw).collect())
     }
 
+    /// Without rows yet; for these triads.
+    pub fn of_triads(triads: impl IntoIterator<Item = TriadName>) -> Self {
+        let triads = triads.into_iter();
+        Self::of(
+            triads
+                .flat_map(|t| [0, 1, 2].map(|axis| Column::of(t, axis)))
+                .collect(),
+        )
+    }
+
+    /// Puts rows in order of their stamps, and keeps the first of those with the same one. Rows of gyro and accelerometer are judged as they come.
+    pub fn sorted(mut self) -> Self {
+        let width = self.columns.len();
+        let mut order: Vec<usize> = (0..self.len()).collect();
+        order.sort_by_key(|row| self.stamps_ns[*row]);
+        order.dedup_by_key(|row| self.stamps_ns[*row]);
+        let rows = order
+            .iter()
+            .flat_map(|row| &self.values[row * width..(row + 1) * width]);
+        self.values = rows.copied().collect();
+        self.stamps_ns = order.iter().map(|row| self.stamps_ns[*row]).collect();
+        self
+    }
+
     /// Appends a row; one value for each column.
     pub fn push(&mut self, stamp_ns: i64, values: impl IntoIterator<Item = f64>) {
         self.stamps_ns.push(stamp_ns);
         self.values.extend(values);
+    }
+
+    /// Whether they are those of further triads alone.
+    pub fn is_further(&self) -> bool {
+        let mut columns = self.columns.iter();
+        columns.all(|column| matches!(column, Column::More(..)))
     }
 
     /// Number of rows.

@@ -1,4 +1,4 @@
-//! Messages `sensor_msgs/Imu` of ROS 1 bags (version 2.0), of ROS 2 bags in SQLite files, and of MCAP files.
+//! Messages `sensor_msgs/Imu` and `sensor_msgs/MagneticField` of ROS 1 bags (version 2.0), of ROS 2 bags in SQLite files, and of MCAP files.
 //!
 //! Their time is the stamp of the header, which the driver has set. Only if it sets none, the time of reception is used.
 //!
@@ -13,10 +13,11 @@ use std::io::Read;
 use std::path::Path;
 
 use super::decimal::Decimal;
+use super::instance::Instance;
 use super::readings::{Choice, LogFormat, Readings, guarded};
 use super::sqlite::Database;
-use crate::columns::Column;
 use crate::error::{Argument, Error, Result};
+use crate::triad_name::{TriadKind, TriadName};
 use definition::Before;
 
 /// Bags of ROS 1.
@@ -61,6 +62,19 @@ struct Imu {
     values: [f64; 6],
 }
 
+/// A message of a magnetometer.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct MagneticField {
+    stamp_ns: i64,
+    /// Time at which it was recorded.
+    received_ns: i64,
+    /// Tesla.
+    values: [f64; 3],
+}
+
+/// Tesla in µT.
+const TESLA_UT: f64 = 1e6;
+
 /// Encoding of a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Layout {
@@ -75,6 +89,8 @@ struct Topic {
     kind: String,
     /// `None` if the messages are of another kind or encoding.
     layout: Option<Layout>,
+    /// Whether the messages are of a magnetometer.
+    is_mag: bool,
     /// What stands before the `sensor_msgs/Imu` of a message that contains one.
     before: Option<Before>,
 }
@@ -83,6 +99,8 @@ impl Topic {
     /// `definition` is that of the messages, if the file has it.
     fn new(name: &str, kind: &str, encoding: &str, definition: &str) -> Self {
         let imu = ["sensor_msgs/Imu", "sensor_msgs/msg/Imu"].contains(&kind);
+        let mags = ["sensor_msgs/MagneticField", "sensor_msgs/msg/MagneticField"];
+        let is_mag = mags.contains(&kind);
         let layout = match encoding {
             "ros1" => Some(Layout::Ros1),
             "cdr" => Some(Layout::Cdr),
@@ -92,9 +110,15 @@ impl Topic {
         Self {
             name: name.to_owned(),
             kind: kind.to_owned(),
-            layout: layout.filter(|_| imu || before.is_some()),
+            layout: layout.filter(|_| imu || is_mag || before.is_some()),
+            is_mag,
             before,
         }
+    }
+
+    /// Whether its messages have a gyro and an accelerometer.
+    fn is_inertial(&self) -> bool {
+        self.layout.is_some() && !self.is_mag
     }
 }
 
@@ -104,20 +128,52 @@ struct Found {
     /// By the number of the topic in the file.
     topics: BTreeMap<u32, Topic>,
     messages: BTreeMap<u32, Vec<Imu>>,
+    /// Of magnetometers; `None` is a message that is cut.
+    mags: BTreeMap<u32, Vec<Option<MagneticField>>>,
     broken: Option<String>,
 }
 
 impl Found {
+    /// All topics with a gyro or an accelerometer, each with the number of its pair: those with both first.
+    fn all_pairs(&self) -> Vec<(u32, u8)> {
+        let inertial = self.topics.iter().filter(|(_, topic)| topic.is_inertial());
+        let has = |topic: &u32| sensors(self.messages.get(topic).map_or(&[], Vec::as_slice));
+        let mut all: Vec<(u32, [bool; 2])> = inertial.map(|(t, _)| (*t, has(t))).collect();
+        all.sort_by_key(|(_, has)| *has != [true; 2]);
+        let mut last = [0_u8; 2];
+        let mut numbered = Vec::new();
+        for (topic, has) in all {
+            let own = (0..2).filter(|sensor| has[*sensor]);
+            let number = 1 + own.clone().map(|sensor| last[sensor]).max().unwrap_or(0);
+            if number > TriadName::MOST {
+                break;
+            }
+            own.for_each(|sensor| last[sensor] = number);
+            numbered.push((topic, number));
+        }
+        numbered
+    }
+
     fn message(&mut self, topic: u32, received_ns: i64, data: &[u8]) {
         let Some(Topic {
             name,
             layout: Some(layout),
+            is_mag,
             before,
             ..
         }) = self.topics.get(&topic)
         else {
             return;
         };
+        if *is_mag {
+            let field = parse_mag(data, *layout);
+            let field = field.map(|field| MagneticField {
+                received_ns,
+                ..field
+            });
+            self.mags.entry(topic).or_default().push(field);
+            return;
+        }
         let messages = self.messages.entry(topic).or_default();
         match parse(data, *layout, before.as_ref()) {
             Some(imu) => messages.push(Imu { received_ns, ..imu }),
@@ -132,21 +188,30 @@ impl Found {
 
 /// The messages of the chosen topics; without a choice, those of the only one, or of the only gyro and the only accelerometer.
 fn chosen(path: &Path, mut found: Found, choice: Choice<'_>) -> Result<Vec<Readings>> {
-    if choice.instance.is_some() {
+    if matches!(choice.instance, Some(Instance::Number(_))) {
         let problem = "an instance is given, but topics have no instances";
         let remedy = "leave it out, and choose the topic";
         return Err(Error::new(path.display(), problem, remedy).about(Argument::Topic));
     }
-    let numbers = choose(path, &found, choice.topics)?;
-    if let Some(message) = found.broken {
+    let is_mag = |name: &String| found.topics.values().any(|t| t.is_mag && t.name == *name);
+    let (mags, wanted): (Vec<String>, Vec<String>) =
+        choice.topics.iter().cloned().partition(is_mag);
+    let numbers = match choice.instance.is_some() && wanted.is_empty() {
+        true => found.all_pairs(),
+        false => {
+            let topics = choose(path, &found, &wanted)?;
+            topics.into_iter().map(|topic| (topic, 1)).collect()
+        }
+    };
+    if let Some(message) = &found.broken {
         let problem = format!("{message} is cut or is not a sensor_msgs/Imu");
         return Err(Error::new(path.display(), problem, "record it again"));
     }
     let several = numbers.len() > 1;
-    let each = numbers.iter().map(|number| {
-        let messages = found.messages.remove(number).unwrap_or_default();
-        let topic = &found.topics[number];
-        let mut readings = readings(&topic.name, &messages, several);
+    let each = numbers.iter().map(|(topic, pair)| {
+        let messages = found.messages.remove(topic).unwrap_or_default();
+        let topic = &found.topics[topic];
+        let mut readings = readings(&topic.name, &messages, several, *pair);
         if topic.before.is_some() {
             let note = format!(
                 "{}: the sensor_msgs/Imu within {} is read",
@@ -154,23 +219,64 @@ fn chosen(path: &Path, mut found: Found, choice: Choice<'_>) -> Result<Vec<Readi
             );
             readings.notes.push(note);
         }
-        readings
+        (*pair, readings)
     });
-    let mut all: Vec<Readings> = each.collect();
+    let mut all: Vec<(u8, Readings)> = each.collect();
     // The others are interpolated at the times of the first.
-    all.sort_by_key(|readings| std::cmp::Reverse(readings.len()));
+    all.sort_by_key(|(pair, readings)| (*pair, std::cmp::Reverse(readings.len())));
+    let mut all: Vec<Readings> = all.into_iter().map(|(_, readings)| readings).collect();
+    all.extend(magnetometers(&found, &mags));
     Ok(all)
 }
 
-/// The readings of the topic `name`; `several`: it is one of several that are joined.
-fn readings(name: &str, messages: &[Imu], several: bool) -> Readings {
+/// The readings of the magnetometers whose topics are `wanted`, or of all. A driver whose unit has none publishes zeros.
+fn magnetometers(found: &Found, wanted: &[String]) -> Vec<Readings> {
+    let measured = |field: &MagneticField| field.values.iter().any(|v| *v != 0.0 && !v.is_nan());
+    let mut all: Vec<Readings> = Vec::new();
+    for (topic, messages) in &found.mags {
+        let name = &found.topics[topic].name;
+        let fields: Vec<&MagneticField> = messages.iter().flatten().collect();
+        let chosen = wanted.is_empty() || wanted.contains(name);
+        let number = all.len() + 1;
+        let Some(number) = u8::try_from(number).ok().filter(|n| *n <= TriadName::MOST) else {
+            break;
+        };
+        if !chosen || !fields.iter().any(|field| measured(field)) {
+            continue;
+        }
+        let kind = TriadKind::Mag;
+        let mut readings = Readings::of_triads([TriadName { kind, number }]);
+        let stamped = fields
+            .iter()
+            .any(|field| field.stamp_ns != fields[0].stamp_ns);
+        for field in &fields {
+            let stamp_ns = if stamped {
+                field.stamp_ns
+            } else {
+                field.received_ns
+            };
+            readings.push(stamp_ns, field.values.map(|tesla| tesla * TESLA_UT));
+        }
+        let (count, cut) = (messages.len(), messages.len() - fields.len());
+        readings
+            .notes
+            .push(format!("{count} messages of {name}, a magnetometer"));
+        if cut > 0 {
+            readings.warnings.push(format!(
+                "{cut} messages of {name} are cut, and were left out"
+            ));
+        }
+        all.push(readings.sorted());
+    }
+    all
+}
+
+/// The readings of the topic `name`, which is the pair `number`; `several`: it is one of several that are joined.
+fn readings(name: &str, messages: &[Imu], several: bool, number: u8) -> Readings {
     let has = sensors(messages);
-    let mut readings = Readings::of(
-        (0..6)
-            .filter(|channel| has[channel / 3])
-            .map(Column::Raw)
-            .collect(),
-    );
+    let kinds = [TriadKind::Gyro, TriadKind::Accel].into_iter().zip(has);
+    let kinds = kinds.filter(|(_, has)| *has);
+    let mut readings = Readings::of_triads(kinds.map(|(kind, _)| TriadName { kind, number }));
     let stamped = messages
         .iter()
         .any(|imu| imu.stamp_ns != messages[0].stamp_ns);
@@ -229,7 +335,7 @@ fn choose(path: &Path, found: &Found, wanted: &[String]) -> Result<Vec<u32>> {
     let refuse = |problem: String, remedy: &str| {
         Err(Error::new(path.display(), problem, remedy).about(Argument::Topic))
     };
-    let fits = topics.iter().filter(|(_, topic)| topic.layout.is_some());
+    let fits = topics.iter().filter(|(_, topic)| topic.is_inertial());
     let fits: Vec<(&u32, &Topic)> = fits.collect();
     let mut chosen = Vec::new();
     for name in wanted {
@@ -348,6 +454,9 @@ fn merge(found: &mut Found) {
             let all = found.messages.entry(to).or_default();
             all.extend(more);
             all.sort_by_key(|imu| imu.stamp_ns);
+            if let Some(more) = found.mags.remove(&number) {
+                found.mags.entry(to).or_default().extend(more);
+            }
         }
     }
 }
@@ -527,9 +636,9 @@ impl Fields<'_> {
     }
 }
 
-/// A message, or the one behind the fields `before`; `None` if it is cut.
-fn parse(data: &[u8], layout: Layout, before: Option<&Before>) -> Option<Imu> {
-    let mut fields = match layout {
+/// The fields of a message.
+fn fields_of(data: &[u8], layout: Layout) -> Option<Fields<'_>> {
+    Some(match layout {
         Layout::Ros1 => Fields {
             bytes: data,
             at: 0,
@@ -542,7 +651,24 @@ fn parse(data: &[u8], layout: Layout, before: Option<&Before>) -> Option<Imu> {
             big_endian: data[1] & 1 == 0,
             aligned: true,
         },
-    };
+    })
+}
+
+/// A message of a magnetometer; `None` if it is cut.
+fn parse_mag(data: &[u8], layout: Layout) -> Option<MagneticField> {
+    let mut fields = fields_of(data, layout)?;
+    let stamp_ns = fields.stamp_ns(layout)?;
+    fields.text()?; // frame
+    Some(MagneticField {
+        stamp_ns,
+        received_ns: 0,
+        values: fields.f64s()?,
+    })
+}
+
+/// A message, or the one behind the fields `before`; `None` if it is cut.
+fn parse(data: &[u8], layout: Layout, before: Option<&Before>) -> Option<Imu> {
+    let mut fields = fields_of(data, layout)?;
     let mut outer_ns = 0;
     if let Some(before) = before {
         if before.header {

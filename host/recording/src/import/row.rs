@@ -15,13 +15,20 @@ pub(super) struct Row {
     pub step: i32,
     /// In the order of the columns of its file.
     pub values: Vec<f64>,
+    /// How many of the values, the last ones, are of further triads.
+    pub further: usize,
 }
 
 impl Row {
-    /// Whether its step and values equal those of `other`.
+    /// Whether its step and values equal those of `other`. Those of further triads do not count: a slower magnetometer may change while a logger writes
+    /// a sample of the others again.
     pub fn repeats(&self, other: &Row) -> bool {
         // Two empty cells (NaN) count as equal.
         let alike = |(a, b): (&f64, &f64)| a == b || a.is_nan() && b.is_nan();
-        self.step == other.step && self.values.iter().zip(&other.values).all(alike)
+        let own = self.values.len() - self.further;
+        // A file of further triads alone has nothing else to compare.
+        let compared = if own == 0 { self.values.len() } else { own };
+        let mut pairs = self.values.iter().zip(&other.values).take(compared);
+        self.step == other.step && pairs.all(alike)
     }
 }

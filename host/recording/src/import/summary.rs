@@ -8,6 +8,7 @@ use super::log_options::file_name;
 use super::preset::PresetUse;
 use super::time::TimeSummary;
 use crate::digits::plural;
+use crate::triad_name::TriadName;
 
 /// Lines of the source files that contained no row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
@@ -68,6 +69,8 @@ pub struct ImportSummary {
     pub broken_rows: Vec<BrokenRows>,
     /// Raw cells that are empty.
     pub empty_cells: u64,
+    /// The triads that were taken, by number and kind.
+    pub triads: Vec<TriadName>,
     /// Whether no column is of an accelerometer.
     #[serde(skip)]
     pub without_accel: bool,

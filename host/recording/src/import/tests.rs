@@ -21,6 +21,7 @@ mod sequence;
 mod sources;
 mod stamps;
 mod thermometers;
+mod triads;
 
 const BOTH: &str = "t_s,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z";
 

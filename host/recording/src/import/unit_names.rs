@@ -23,6 +23,15 @@ const FORCES: [(&str, &str); 3] = [
     ),
     ("g", "g|gs|g's|gravity|gees"),
 ];
+/// Units of a magnetometer. Only names of its columns are searched for them, so small letters do for all.
+const FIELDS: [(&str, &str); 6] = [
+    ("µT", "ut|µt|μt|microtesla|micro-tesla|microteslas"),
+    ("nT", "nt|nanotesla"),
+    ("mG", "mg|mgauss|milligauss|mgs|mga"),
+    ("mT", "mt|millitesla"),
+    ("gauss", "gauss|ga"),
+    ("T", "tesla"),
+];
 const CLOCKS: [(Decimal, &str); 4] = [
     (Decimal::Nanosecond, "ns|nsec|nanoseconds|nanosec|nanos"),
     (
@@ -85,6 +94,41 @@ pub(super) fn force_unit(text: &str) -> Option<&'static str> {
     of(text, &FORCES).or_else(|| text.contains(ROS[1]).then_some("m/s²"))
 }
 
+/// The unit of a magnetometer. A separate `G` or `T` is one only in brackets or at the end.
+pub(super) fn field_unit(text: &str) -> Option<&'static str> {
+    let end = text.trim_end().trim_end_matches([')', ']']);
+    let mut last = end.chars().rev();
+    let letter = match (last.next(), last.next()) {
+        (Some(_), Some(before)) if before.is_alphanumeric() => None,
+        (Some('G'), _) => Some("gauss"),
+        (Some('T'), _) => Some("T"),
+        _ => None,
+    };
+    of(text, &FIELDS).or(letter)
+}
+
+/// Size of a unit of a magnetometer, µT.
+pub(super) fn microtesla(unit: &str) -> Option<f64> {
+    Some(match unit {
+        "µT" => 1.0,
+        "nT" => 1e-3,
+        "mG" => 0.1,
+        "mT" => 1e3,
+        "gauss" => 100.0,
+        "T" => 1e6,
+        _ => return None,
+    })
+}
+
+/// A name without the unit of a field at its end: `mx_uT`, `magX mG`.
+pub(super) fn without_field_unit(name: &str) -> &str {
+    let bare = name.rsplit_once(['_', ' ']);
+    match bare.filter(|(_, unit)| ["uT", "µT", "μT", "nT", "mG", "mT"].contains(unit)) {
+        Some((bare, _)) => bare,
+        None => name,
+    }
+}
+
 /// The unit of time stamps.
 pub(super) fn clock_unit(text: &str) -> Option<Decimal> {
     of(text, &CLOCKS).or_else(|| words(text).iter().find_map(|word| of(word, &CLOCKS)))
@@ -141,6 +185,17 @@ mod tests {
             ("ax", None),
         ] {
             assert_eq!(force_unit(text), unit, "{text}");
+        }
+        for (text, unit) in [
+            ("Magnetic field x (µT)", Some("µT")),
+            ("mag_x_uT", Some("µT")),
+            ("Mx [mG]", Some("mG")),
+            ("mag_x (T)", Some("T")),
+            ("MagX [G]", Some("gauss")),
+            ("magX", None),
+            ("m_T_x", None),
+        ] {
+            assert_eq!(field_unit(text), unit, "{text}");
         }
         for (text, unit) in [
             ("Time (ms)", Some(Decimal::Millisecond)),

@@ -19,7 +19,13 @@ fn all_columns() -> Columns {
         gyro: true,
         accel: true,
         reference: [true; 6],
+        more: triads(&["mag", "gyro2", "accel2", "mag12"]),
     }
+}
+
+fn triads(names: &[&str]) -> Triads {
+    let names = names.iter();
+    names.map(|name| TriadName::parse(name).unwrap()).collect()
 }
 
 /// Rows with every kind of number, and with empty cells.
@@ -70,7 +76,7 @@ fn read(path: &Path) -> Result<Batch> {
         |_| (),
         |batch| {
             all.step.extend(&batch.step);
-            for column in Column::all() {
+            for column in recording.columns.present() {
                 if let (Some(all), Some(values)) = (all.values_mut(column), batch.values(column)) {
                     all.extend(values);
                 }
@@ -83,7 +89,11 @@ fn read(path: &Path) -> Result<Batch> {
 
 fn assert_same(a: &Batch, b: &Batch) {
     assert_eq!(a.step, b.step);
-    for column in Column::all() {
+    let more = |of: &Batch| -> Vec<TriadName> { of.more.iter().map(|(t, _)| *t).collect() };
+    assert_eq!(more(a), more(b));
+    let further = more(a).into_iter();
+    let further = further.flat_map(|t| [0, 1, 2].map(|axis| Column::of(t, axis)));
+    for column in Column::fixed().chain(further) {
         let bits = |batch: &Batch| -> Option<Vec<u64>> {
             let bits = |v: &f64| if v.is_nan() { u64::MAX } else { v.to_bits() };
             Some(batch.values(column)?.iter().map(bits).collect())
@@ -116,6 +126,114 @@ fn every_number_and_every_empty_cell_comes_back_exactly_from_both_formats() {
     }
 }
 
+/// Samples of [`rows`] in memory.
+#[derive(Debug)]
+struct Arrays(Columns, Batch);
+
+impl InMemory for Arrays {
+    fn rows(&self) -> usize {
+        self.1.len()
+    }
+
+    fn columns(&self) -> Columns {
+        self.0
+    }
+
+    fn append(
+        &self,
+        column: Column,
+        rows: std::ops::Range<usize>,
+        values: &mut Vec<f64>,
+    ) -> Result<()> {
+        match self.1.values(column) {
+            Some(all) => values.extend_from_slice(&all[rows]),
+            None => values.extend(self.1.step[rows].iter().copied().map(f64::from)),
+        }
+        Ok(())
+    }
+}
+
+#[test]
+fn a_pair_is_a_recording_of_its_two_triads_whatever_the_samples_are_in() {
+    let folder = tempfile::tempdir().unwrap();
+    let columns = Columns {
+        more: triads(&["mag", "gyro2", "accel2", "accel3"]),
+        ..all_columns()
+    };
+    let batch = rows(columns, 1000);
+    let mut recordings: Vec<Recording> = [SampleFormat::Csv, SampleFormat::Parquet]
+        .into_iter()
+        .map(|format| {
+            let path = folder.path().join(format.file_name());
+            write(&path, columns, format, std::slice::from_ref(&batch)).unwrap();
+            Recording::open(&path).unwrap()
+        })
+        .collect();
+    let arrays = std::sync::Arc::new(Arrays(columns, batch.clone()));
+    recordings.push(Recording::in_memory(manifest(), arrays).unwrap());
+    let bits = |values: &[f64]| -> Vec<u64> {
+        let bits = |v: &f64| if v.is_nan() { u64::MAX } else { v.to_bits() };
+        values.iter().map(bits).collect()
+    };
+    for recording in &recordings {
+        let pair = recording.pair(2).unwrap();
+        assert_eq!(pair.triads(), [TriadName::GYRO, TriadName::ACCEL]);
+        assert!(pair.name().ends_with("pair 2"), "{}", pair.name());
+        let of = |name: &str, axis| Column::of(TriadName::parse(name).unwrap(), axis);
+        let asked = [Column::Time, Column::Raw(1), Column::Raw(5), Column::Step];
+        let behind = [Column::Time, of("gyro2", 1), of("accel2", 2), Column::Step];
+        let (viewed, whole) = (
+            pair.read_columns(&asked, |_| {}).unwrap(),
+            recording.read_columns(&behind, |_| {}).unwrap(),
+        );
+        for (viewed, whole) in viewed.iter().zip(&whole) {
+            assert_eq!(bits(viewed), bits(whole));
+            assert_eq!(viewed.len(), 1000);
+        }
+        let mut seen = 0;
+        let read = pair.for_each_batch(
+            |_| {},
+            |part| {
+                let at = seen..seen + part.len();
+                seen = at.end;
+                assert!(part.more.is_empty());
+                assert_eq!(
+                    bits(&part.raw[3]),
+                    bits(&batch.values(of("accel2", 0)).unwrap()[at.clone()])
+                );
+                assert_eq!(
+                    bits(&part.reference[0]),
+                    bits(&batch.reference[0][at.clone()])
+                );
+                assert_eq!(part.step, batch.step[at]);
+                Ok(())
+            },
+        );
+        assert_eq!((read.unwrap().rows, seen), (1000, 1000));
+        assert_eq!(recording.pair(3).unwrap().triads(), [TriadName::ACCEL]);
+        let error = recording.pair(4).unwrap_err().to_string();
+        says(
+            &error,
+            &[
+                "neither gyro4 nor accel4",
+                "gyro, accel, mag, gyro2, accel2, accel3",
+            ],
+        );
+    }
+}
+
+#[test]
+fn a_bad_cell_of_a_pair_is_told_with_the_column_of_the_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(MANIFEST_FILE);
+    std::fs::write(path, manifest().to_toml().unwrap()).unwrap();
+    let csv = "t_s,gyro_x,gyro_y,gyro_z,gyro2_x,gyro2_y,gyro2_z\n0,1,2,3,4,5,6\n1,1,2,3,4,bad,6\n";
+    std::fs::write(folder.path().join("samples.csv"), csv).unwrap();
+    let pair = Recording::open(folder.path()).unwrap().pair(2).unwrap();
+    let error = pair.for_each_batch(|_| {}, |_| Ok(())).unwrap_err();
+    says(&error.to_string(), &["row 3, column gyro2_y", "\"bad\""]);
+}
+
 #[test]
 fn many_batches_and_row_groups_read_back_as_one_recording() {
     let folder = tempfile::tempdir().unwrap();
@@ -138,7 +256,7 @@ fn many_batches_and_row_groups_read_back_as_one_recording() {
     let path = folder.path().join("batches");
     let single = |row: usize| {
         let mut batch = Batch::default();
-        for column in Column::all() {
+        for column in columns.present() {
             if let (Some(one), Some(values)) = (batch.values_mut(column), whole.values(column)) {
                 one.push(values[row]);
             }

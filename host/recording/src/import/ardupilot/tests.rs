@@ -5,6 +5,7 @@
 
 use std::path::PathBuf;
 
+use super::super::instance::Instance;
 use super::super::table::Cells;
 use super::super::time::Stamp;
 use super::*;
@@ -20,7 +21,7 @@ fn open(path: &Path, topic: Option<&str>, instance: Option<u32>) -> Result<Vec<R
         path,
         Choice {
             topics: &topics,
-            instance,
+            instance: instance.map(Instance::Number),
         },
     )
 }
@@ -153,6 +154,62 @@ fn what_is_not_there_is_refused_with_what_is() {
     assert!(refused(None, Some(4)).contains("no instance 4"));
     assert!(refused(Some("BARO"), Some(0)).contains("no BARO of instance 0"));
     assert!(refused(Some("GYR"), Some(0)).contains("no GYR of instance 0"));
+}
+
+#[test]
+fn all_sensors_are_pairs_with_numbers() {
+    let all = read(
+        &fixture(),
+        Choice {
+            topics: &[],
+            instance: Some(Instance::All),
+        },
+    );
+    let mut all = all.unwrap();
+    let first = |readings: &Readings| readings.roles()[1].name();
+    let firsts: Vec<&str> = all.iter().map(first).collect();
+    assert_eq!(firsts, ["gyro_x", "gyro2_x", "accel2_x"]);
+    // A recording has one temperature.
+    assert_eq!(all[1].roles().len(), 4);
+    close(&rows(&mut all[2])[7].1, &[0.75, 2.0, -8.0]);
+}
+
+#[test]
+fn a_magnetometer_is_in_microtesla_at_the_time_of_its_sample() {
+    let mut log = before_3_3();
+    let filled = |text: &str, length: usize| {
+        let mut bytes = text.as_bytes().to_vec();
+        bytes.resize(length, 0);
+        bytes
+    };
+    log.extend([0xA3, 0x95, 128, 67, 23]);
+    log.extend(filled("MAG", 4));
+    log.extend(filled("QBhhhBI", 16));
+    log.extend(filled("TimeUS,I,MagX,MagY,MagZ,Health,S", 64));
+    for r in 0..5_u64 {
+        // Logged 30 ms after the sample, by a counter of 32 bits that has wrapped.
+        let logged_us = (1_u64 << 32) + 10_000 + 100_000 * r;
+        log.extend([0xA3, 0x95, 67]);
+        log.extend(logged_us.to_le_bytes());
+        log.push(1);
+        for mag in [100 + r as i16, -250, 400] {
+            log.extend(mag.to_le_bytes());
+        }
+        log.push(1);
+        log.extend(((logged_us - 30_000) as u32).to_le_bytes());
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("log.bin");
+    std::fs::write(&path, log).unwrap();
+    let mut all = open(&path, None, Some(0)).unwrap();
+    assert_eq!((all.len(), all[1].roles()[1].name()), (2, "mag_x"));
+    let rows = rows(&mut all[1]);
+    let sampled_us = (1_i64 << 32) + 10_000 + 200_000 - 30_000;
+    assert_eq!(
+        (rows.len(), rows[2].0),
+        (5, Stamp::from(1_000 * sampled_us))
+    );
+    close(&rows[2].1, &[10.2, -25.0, 40.0]);
 }
 
 /// The log without those records of kind `number`, `length` bytes long, that `keep` rejects.

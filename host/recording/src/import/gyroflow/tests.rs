@@ -28,11 +28,23 @@ fn readings_are_in_si_by_the_factors_of_the_header() {
 }
 
 #[test]
-fn stamps_are_milliseconds_without_a_factor_and_a_magnetometer_is_not_read() {
-    let text = "CAMERA IMU LOG\ngscale,1\nascale,1\nmscale,1\ntime,gx,gy,gz,ax,ay,az,mx,my,mz\n20,1,2,3,0,0,1,7,8,9\n";
-    let (stamps, values) = rows(read_text(text).unwrap());
-    assert_eq!(stamps, [20_000_000]);
-    assert_eq!(values, [1.0, 2.0, 3.0, 0.0, 0.0, 9.80665]);
+fn stamps_are_milliseconds_without_a_factor_and_a_magnetometer_is_in_gauss() {
+    let text = "CAMERA IMU LOG\ngscale,1\nascale,1\nmscale,0.001\ntime,gx,gy,gz,ax,ay,az,mx,my,mz\n20,1,2,3,0,0,1,70,-80,90\n21,1,2,3,0,0,1,,,\n";
+    let readings = read_text(text).unwrap();
+    let mag = readings.roles()[7..].iter().map(|role| role.name());
+    assert_eq!(mag.collect::<Vec<_>>(), ["mag_x", "mag_y", "mag_z"]);
+    let (stamps, values) = rows(readings);
+    assert_eq!(stamps, [20_000_000, 21_000_000]);
+    assert_eq!(values[..6], [1.0, 2.0, 3.0, 0.0, 0.0, 9.80665]);
+    let off = values[6..9]
+        .iter()
+        .zip([7.0, -8.0, 9.0])
+        .map(|(a, b)| (a - b).abs());
+    assert!(off.fold(0.0, f64::max) < 1e-12, "{values:?}");
+    assert!(values[15..].iter().all(|value| value.is_nan()));
+    // Without its factor its readings have no unit.
+    let without = read_text(&text.replace("mscale,0.001\n", "")).unwrap();
+    assert_eq!(without.roles().len(), 7);
 }
 
 #[test]

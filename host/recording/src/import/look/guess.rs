@@ -5,10 +5,11 @@
 
 use serde::Serialize;
 
+use super::triads::take_further;
 use crate::RAW_COLUMNS;
 use crate::import::decimal::Decimal;
 use crate::import::names::{Meaning, are_seconds_of, is_other, meaning};
-use crate::import::unit_names::{clock_unit, clock_unit_within, force_unit, rate_unit};
+use crate::import::unit_names::{clock_unit, clock_unit_within, field_unit, force_unit, rate_unit};
 use crate::units::{Series, UnitFound, accel_unit, gyro_unit};
 
 /// A guess for one file.
@@ -20,6 +21,8 @@ pub struct Guess {
     pub gyro_unit: Option<&'static str>,
     /// Unit of the accelerometer, if the names of its columns contain it.
     pub accel_unit: Option<&'static str>,
+    /// Unit of the magnetometer, if the names of its columns contain it.
+    pub mag_unit: Option<&'static str>,
     /// Unit of the time stamps, if the name of their column contains it.
     pub time_unit: Option<Decimal>,
     /// Whether the roles follow from the readings alone.
@@ -34,6 +37,7 @@ pub struct Guess {
 
 const GYRO: [&str; 3] = ["gyro_x", "gyro_y", "gyro_z"];
 const ACCEL: [&str; 3] = ["accel_x", "accel_y", "accel_z"];
+const MAG: [&str; 3] = ["mag_x", "mag_y", "mag_z"];
 
 /// Guesses the columns of the file called `file` from these names, the units in a row of their own, and the first rows; `clock` is the column of dates or
 /// times of day.
@@ -82,6 +86,7 @@ pub fn guess(
     };
     guess.gyro_unit = alike(&said(&GYRO), rate_unit);
     guess.accel_unit = alike(&said(&ACCEL), force_unit);
+    guess.mag_unit = alike(&said(&MAG), field_unit);
     guess.time_unit = alike(&said(&["t_s"]), clock_unit);
     if guess.grows && guess.time_unit.is_none() {
         guess.time_unit = alike(&said(&["t_s"]), clock_unit_within);
@@ -105,6 +110,7 @@ fn by_names(file: &str, names: &[String]) -> Guess {
     ) {
         (true, false) => Some(&GYRO),
         (false, true) => Some(&ACCEL),
+        (false, false) if file.contains("mag") || file.contains("compass") => Some(&MAG),
         _ => None,
     };
     let named = |role: &str| names.iter().any(|name| name == role);
@@ -120,12 +126,13 @@ fn by_names(file: &str, names: &[String]) -> Guess {
             (None, Meaning::Nanoseconds) => "t_ns",
             (None, Meaning::Gyro(axis)) => GYRO[axis],
             (None, Meaning::Accel(axis)) => ACCEL[axis],
+            (None, Meaning::Mag(axis)) => MAG[axis],
             (None, Meaning::Axis(axis)) => {
                 // `x (m/s^2)` says it by its unit.
                 let by_unit = match (rate_unit(name), force_unit(name)) {
                     (Some(_), None) => Some(&GYRO),
                     (None, Some(_)) => Some(&ACCEL),
-                    _ => None,
+                    _ => field_unit(name).map(|_| &MAG),
                 };
                 of_file.or(by_unit).map_or("-", |triad| triad[axis])
             }
@@ -138,6 +145,7 @@ fn by_names(file: &str, names: &[String]) -> Guess {
         // Of two sensors or two clocks, the first is used.
         roles.push(if roles.contains(&role) { "-" } else { role });
     }
+    take_further(names, &mut roles);
     // Beside them are the seconds of the same stamp: bagpy's `Time` is when the message was received.
     if let Some(at) = roles.iter().position(|role| *role == "t_ns")
         && let Some(seconds) = names
@@ -369,7 +377,7 @@ mod tests {
         }
         assert_eq!(
             roles(&["time", "magX", "magY", "magZ", "temperature"]),
-            ["t_s", "-", "-", "-", "temp_c"]
+            ["t_s", "mag_x", "mag_y", "mag_z", "temp_c"]
         );
     }
 

@@ -7,6 +7,7 @@
 mod guess;
 #[cfg(test)]
 mod tests;
+mod triads;
 
 use std::path::{Path, PathBuf};
 
@@ -21,8 +22,10 @@ use super::per_column::Scale;
 use super::preview::{Preview, preview};
 use super::reading_units::{ReadingUnits, STANDARD_GRAVITY, si};
 use super::time::{Seen, Unit, calendar_time};
+use super::unit_names::microtesla;
 use crate::error::{Argument, Error, Result};
 use crate::separator::Separator;
+use crate::triad_name::{TriadKind, TriadName};
 use crate::units::UnitFound;
 use crate::{Column, RAW_COLUMNS, RawUnit};
 
@@ -169,6 +172,7 @@ impl Look {
             });
             numbers.push(rows);
         }
+        take_triads_once(&mut looks);
         let guesses: Vec<&Guess> = looks.iter().map(|look| &look.guess).collect();
         let units = Units::of(&guesses, &numbers);
         let mut look = Self {
@@ -427,14 +431,38 @@ impl Look {
 
     fn convert(&mut self, gyro: Option<&str>, accel: Option<&str>) {
         self.raw_unit = Some(RawUnit::Si);
-        for (sensor, unit) in [("gyro", gyro), ("accel", accel)] {
-            let factor = unit.and_then(si).unwrap_or(1.0);
-            if factor != 1.0
-                && let Ok(scale) = format!("{sensor}={factor}").parse()
-            {
-                self.scales.push(scale);
-            }
-        }
+        let size = |unit: Option<&str>| unit.and_then(si).unwrap_or(1.0);
+        self.scale(TriadKind::Gyro, size(gyro));
+        self.scale(TriadKind::Accel, size(accel));
+        // Without a unit in its names a magnetometer stays in its own: the size of the field on the spot gives the factor, or none is needed.
+        let field = self.mag_unit().and_then(microtesla);
+        self.scale(TriadKind::Mag, field.unwrap_or(1.0));
+    }
+
+    /// Adds a factor for all triads of `kind`: further sensors of one logger are in the unit of the first.
+    fn scale(&mut self, kind: TriadKind, factor: f64) {
+        let first = (kind != TriadKind::Mag).then_some(TriadName::first(kind));
+        let triads = first
+            .into_iter()
+            .chain(self.further().filter(|t| t.kind == kind));
+        let scales = triads.filter(|_| factor != 1.0);
+        let scales = scales.filter_map(|triad| format!("{triad}={factor}").parse().ok());
+        let scales: Vec<Scale> = scales.collect();
+        self.scales.extend(scales);
+    }
+
+    /// The triads beyond the first gyro and the first accelerometer, each once.
+    fn further(&self) -> impl Iterator<Item = TriadName> + '_ {
+        let roles = self.files.iter().flat_map(|look| &look.guess.roles);
+        roles.filter_map(|role| match Column::from_name(role) {
+            Some(Column::More(triad, 0)) => Some(triad),
+            _ => None,
+        })
+    }
+
+    /// Unit of the magnetometer, if the names of its columns say it.
+    fn mag_unit(&self) -> Option<&'static str> {
+        self.files.iter().find_map(|look| look.guess.mag_unit)
     }
 
     /// One sensor in a unit, the other in counts: a recording has one unit, so the counts are converted by their nominal size.
@@ -443,9 +471,7 @@ impl Look {
         match (accel, per_g) {
             (Some("count"), Some(per_g)) => {
                 self.convert(gyro, None);
-                if let Ok(scale) = format!("accel={}", STANDARD_GRAVITY / per_g).parse() {
-                    self.scales.push(scale);
-                }
+                self.scale(TriadKind::Accel, STANDARD_GRAVITY / per_g);
             }
             _ => {
                 let about = "one sensor is in a unit and the other in counts, and a recording has one unit for both".into();
@@ -488,6 +514,12 @@ impl Look {
                 lines.push(format!("{sensor} in {unit}: {}", found.reason));
             }
         }
+        if self.further().any(|triad| triad == TriadName::MAG) {
+            lines.push(match self.mag_unit() {
+                Some(unit) => format!("magnetometer in {unit}: by the names of its columns"),
+                None => "magnetometer in its own unit: the names of its columns say none".into(),
+            });
+        }
         lines
     }
 
@@ -512,6 +544,21 @@ impl Look {
             about.join("; "),
             format!("say it: {command}{}", options.collect::<String>()),
         ))
+    }
+}
+
+/// Keeps a further triad in the first file that has it: joined files of phones may have one magnetometer each.
+fn take_triads_once(looks: &mut [FileLook]) {
+    let mut before: Vec<&'static str> = Vec::new();
+    for look in looks {
+        let further = |role: &str| matches!(Column::from_name(role), Some(Column::More(..)));
+        for role in &mut look.guess.roles {
+            if before.contains(role) {
+                *role = "-";
+            }
+        }
+        let own = look.guess.roles.iter().copied();
+        before.extend(own.filter(|role| further(role)));
     }
 }
 

@@ -15,6 +15,8 @@ pub struct Preset {
     pub(super) layouts: &'static [Layout],
     /// Files that a folder may contain, the best set first; the faster sensor first in each.
     pub(super) in_folder: &'static [&'static [&'static str]],
+    /// Files of a magnetometer that may be beside them, the best first.
+    pub(super) mag_in_folder: &'static [&'static str],
     /// A file beside the readings that decides between two presets with the same headers.
     pub(super) beside: Option<Beside>,
 }
@@ -26,8 +28,8 @@ pub(super) struct Layout {
     pub file: Option<&'static str>,
     /// Its columns, all of which must be there, written as for the command line.
     pub columns: &'static str,
-    /// Columns that it may have.
-    pub optional: &'static str,
+    /// Columns that it may have, each group whole.
+    pub optional: &'static [&'static str],
     /// Factors of columns, signs included, written as for the command line.
     pub scales: &'static [&'static str],
     /// Where the sample rate is. The line is required.
@@ -42,7 +44,7 @@ impl Layout {
         Layout {
             file: None,
             columns,
-            optional: "",
+            optional: &[],
             scales: &[],
             rate: None,
             refusal: None,

@@ -14,6 +14,9 @@ const fn sensor_logger(file: &'static str, columns: &'static str) -> Layout {
 
 const LOGGED_GYRO: &str = "t_s=time,gyro_x=x,gyro_y=y,gyro_z=z";
 const LOGGED_ACCEL: &str = "t_s=time,accel_x=x,accel_y=y,accel_z=z";
+/// In µT on both systems.
+const LOGGED_MAG: &str = "t_s=time,mag_x=x,mag_y=y,mag_z=z";
+const MAG_FILES: [&str; 2] = ["MagnetometerUncalibrated.csv", "Magnetometer.csv"];
 
 /// A file of Sensor Logger with an acceleration that is not a reading of a sensor.
 const fn without_gravity(file: &'static str) -> Layout {
@@ -38,9 +41,9 @@ const LOGGED_FOLDER: [&[&str]; 6] = [
     &["TotalAcceleration.csv"],
 ];
 
-/// Calibrated readings of the packets, and the temperature if it was exported.
+/// Calibrated readings of the packets, and temperature and magnetometer (in a unit of its own) if they were exported.
 const XSENS: Layout = Layout {
-    optional: "temp_c=Temperature",
+    optional: &["temp_c=Temperature", "mag_x=Mag_X,mag_y=Mag_Y,mag_z=Mag_Z"],
     rate: Some(Rate::Above("Update Rate:")),
     ..Layout::of("")
 };
@@ -61,6 +64,7 @@ pub(super) const PRESETS: [Preset; 6] = [
             )
         }],
         in_folder: &[&["data.csv"], &["imu0/data.csv"], &["mav0/imu0/data.csv"]],
+        mag_in_folder: &[],
         beside: None,
     },
     // github.com/tszheichoi/awesome-sensor-logger at b10f5c5: README.md (Metadata.csv), UNITS.md, COORDINATES.md, CROSSPLATFORM.md. The columns are
@@ -77,8 +81,11 @@ pub(super) const PRESETS: [Preset; 6] = [
             sensor_logger("TotalAcceleration.csv", LOGGED_ACCEL),
             without_gravity("Accelerometer.csv"),
             without_gravity("Gravity.csv"),
+            sensor_logger(MAG_FILES[0], LOGGED_MAG),
+            sensor_logger(MAG_FILES[1], LOGGED_MAG),
         ],
         in_folder: &LOGGED_FOLDER,
+        mag_in_folder: &MAG_FILES,
         beside: Some(Beside {
             file: "Metadata.csv",
             values: &AS_ANDROID,
@@ -100,8 +107,11 @@ pub(super) const PRESETS: [Preset; 6] = [
             },
             without_gravity("Accelerometer.csv"),
             without_gravity("Gravity.csv"),
+            sensor_logger(MAG_FILES[0], LOGGED_MAG),
+            sensor_logger(MAG_FILES[1], LOGGED_MAG),
         ],
         in_folder: &LOGGED_FOLDER,
+        mag_in_folder: &MAG_FILES,
         beside: Some(Beside {
             file: "Metadata.csv",
             values: &AS_ANDROID,
@@ -129,6 +139,9 @@ pub(super) const PRESETS: [Preset; 6] = [
             Layout::of(
                 "t_s=Time (s),gyro_x=Gyroscope x (rad/s),gyro_y=Gyroscope y (rad/s),gyro_z=Gyroscope z (rad/s)",
             ),
+            Layout::of(
+                "t_s=Time (s),mag_x=Magnetic field x (µT),mag_y=Magnetic field y (µT),mag_z=Magnetic field z (µT)",
+            ),
             Layout {
                 refusal: Some([
                     "it contains the acceleration without gravity, which is not a reading of a sensor",
@@ -144,6 +157,7 @@ pub(super) const PRESETS: [Preset; 6] = [
             &["Raw Data.csv"],
             &["Accelerometer.csv"],
         ],
+        mag_in_folder: &["Magnetometer.csv"],
         beside: None,
     },
     // Text exports of MT Manager: lines with // above the names, one of which has the rate. Units by the MTw user manual (table of exported data):
@@ -165,6 +179,7 @@ pub(super) const PRESETS: [Preset; 6] = [
             },
         ],
         in_folder: &[],
+        mag_in_folder: &[],
         beside: None,
     },
     // github.com/jitingcn/SlimeVR-Tracker-nRF-Receiver at 87996f1: scripts/data_collect_hid.py and data_collect_cdc.py. The numbers are those of the
@@ -174,7 +189,7 @@ pub(super) const PRESETS: [Preset; 6] = [
         title: "raw data of a SlimeNRF tracker, by the receiver's data_collect script: NAME.csv and NAME.meta.txt",
         raw_unit: Some(RawUnit::Si),
         layouts: &[Layout {
-            optional: "temp_c=temp",
+            optional: &["temp_c=temp"],
             scales: &["gyro=0.017453292519943295", "accel=9.80665"],
             rate: Some(Rate::Beside("meta.txt", "gyro_odr_hz=")),
             ..Layout::of(
@@ -182,6 +197,7 @@ pub(super) const PRESETS: [Preset; 6] = [
             )
         }],
         in_folder: &[],
+        mag_in_folder: &[],
         beside: None,
     },
 ];

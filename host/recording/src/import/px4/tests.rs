@@ -3,6 +3,7 @@
 
 use std::path::PathBuf;
 
+use super::super::instance::Instance;
 use super::super::table::Cells;
 use super::super::time::Stamp;
 use super::*;
@@ -26,7 +27,7 @@ fn open(path: &Path, topic: Option<&str>, instance: Option<u32>) -> Result<Vec<R
         path,
         Choice {
             topics: &topics,
-            instance,
+            instance: instance.map(Instance::Number),
         },
     )
 }
@@ -56,7 +57,10 @@ fn the_raw_topics_of_an_instance_are_what_pyulog_reads() {
         return;
     };
     let mut all = open(&path, None, Some(1)).unwrap();
-    assert_eq!(all.len(), 2);
+    assert_eq!(
+        all.iter().filter(|readings| !readings.is_further()).count(),
+        2
+    );
     let stamps_us = [
         21_310_770, 22_310_821, 23_313_270, 24_313_324, 25_310_770, 26_310_770,
     ];
@@ -91,7 +95,7 @@ fn the_calibration_of_sensor_combined_is_undone_down_to_the_raw_topics() {
     };
     let mut all = open(&path, None, None).unwrap();
     let readings = all.remove(0);
-    assert!(all.is_empty());
+    assert!(all.iter().all(Readings::is_further));
     assert!(
         readings.notes[0].contains("1298 samples of sensor_combined, because the topics"),
         "{:?}",
@@ -276,6 +280,68 @@ fn an_instance_is_asked_for_where_there_are_several_and_the_instances_are_listed
             .iter()
             .any(|w| w.contains("different devices"))
     );
+}
+
+#[test]
+fn all_instances_are_pairs_with_numbers_and_magnetometers_are_in_microtesla() {
+    let mut log = two_devices()
+        .format(&format!("sensor_mag:{SENSOR}"))
+        .subscribe(0, 3, "sensor_mag")
+        .subscribe(1, 4, "sensor_mag");
+    for i in 0..10_u16 {
+        let x = f32::from(i) / 64.0;
+        // Rows of the second come in pairs that are swapped.
+        let late = 1_000 * u64::from(i ^ 1);
+        log = log
+            .sensor(
+                3,
+                5_000 + 1_000 * u64::from(i),
+                0x0077_2244,
+                [x, 0.25, -0.5],
+            )
+            .sensor(4, 5_100 + late, 0x0077_2255, [0.5, x, 0.0]);
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let path = log.save(&folder, "log.ulg");
+    let all = read(
+        &path,
+        Choice {
+            topics: &[],
+            instance: Some(Instance::All),
+        },
+    );
+    let mut all = all.unwrap();
+    let columns: Vec<String> = all
+        .iter()
+        .map(|readings| {
+            let names = readings.roles().into_iter().skip(1).map(|role| role.name());
+            names.collect::<Vec<_>>().join(" ")
+        })
+        .collect();
+    assert_eq!(
+        columns,
+        [
+            "gyro_x gyro_y gyro_z temp_c",
+            "accel_x accel_y accel_z",
+            "accel2_x accel2_y accel2_z",
+            "mag_x mag_y mag_z",
+            "mag2_x mag2_y mag2_z",
+        ]
+    );
+    assert_eq!(rows(&mut all[3])[4].1, [6.25, 25.0, -50.0]);
+    let second = rows(&mut all[4]);
+    assert_eq!(
+        second[4],
+        (Stamp::from(9_100_000), vec![50.0, 500.0 / 64.0, 0.0])
+    );
+    assert!(second.is_sorted_by_key(|(stamp, _)| stamp.value));
+    says(
+        &all[4].notes[0],
+        &["10 samples of sensor_mag instance 1 (device 7807573)"],
+    );
+    // Without a choice too, a magnetometer is never the question.
+    let chosen = open(&path, None, Some(0)).unwrap();
+    assert_eq!(chosen.len(), 4);
 }
 
 #[test]

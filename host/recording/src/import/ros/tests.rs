@@ -121,6 +121,61 @@ fn a_message_within_another_is_found_by_the_definition_in_the_file() {
 }
 
 #[test]
+fn magnetometers_are_read_beside_the_topic_of_an_imu_and_zeros_are_none() {
+    let message = |stamp: u32, field: [f64; 3]| {
+        let header = [7, 5, stamp, 1].map(u32::to_le_bytes).concat();
+        let numbers = field.into_iter().chain([0.0; 9]).flat_map(f64::to_le_bytes);
+        [header, b"f".to_vec(), numbers.collect()].concat()
+    };
+    let mut found = Found::default();
+    for (number, name) in [(0, "/mag"), (1, "/none"), (2, "/second")] {
+        let topic = Topic::new(name, "sensor_msgs/MagneticField", "ros1", "");
+        assert!(topic.is_mag && !topic.is_inertial());
+        found.topics.insert(number, topic);
+    }
+    for i in [2, 1, 3_u32] {
+        let x = f64::from(i) * 1e-6;
+        found.message(0, 0, &message(i, [x, -2e-5, 4e-5]));
+        found.message(1, 0, &message(i, [0.0; 3]));
+        found.message(2, 9, &message(i, [x, 0.0, 0.0]));
+    }
+    found.message(2, 9, &message(4, [0.0; 3])[..30]);
+    let mut all = magnetometers(&found, &[]);
+    assert_eq!(all.len(), 2);
+    assert_eq!(all[1].roles()[3].name(), "mag2_z");
+    assert!(all[1].warnings[0].contains("1 messages of /second are cut"));
+    // In order of their stamps.
+    let rows = rows(&mut all[0]);
+    assert_eq!(rows[0].0, Stamp::from(5_000_000_001));
+    for (read, wanted) in rows[1].1.iter().zip([2.0, -20.0, 40.0]) {
+        assert!((read - wanted).abs() < 1e-9, "{rows:?}");
+    }
+    let chosen = magnetometers(&found, &["/second".to_owned()]);
+    assert_eq!((chosen.len(), chosen[0].roles()[1].name()), (1, "mag_x"));
+}
+
+#[test]
+fn all_topics_of_a_bag_are_pairs_with_numbers() {
+    let choice = Choice {
+        topics: &[],
+        instance: Some(Instance::All),
+    };
+    let all = read_bag(&fixture("imu.bag"), choice).unwrap();
+    let columns = |readings: &Readings| readings.roles().into_iter().map(|role| role.name());
+    let columns: Vec<String> = all
+        .iter()
+        .map(|r| columns(r).collect::<Vec<_>>().join(" "))
+        .collect();
+    assert_eq!(
+        columns,
+        [
+            "t_s gyro_x gyro_y gyro_z accel_x accel_y accel_z",
+            "t_s gyro2_x gyro2_y gyro2_z accel2_x accel2_y accel2_z"
+        ]
+    );
+}
+
+#[test]
 fn topics_are_listed_where_several_fit_or_none_does() {
     let refused = |name: &str, topic| open(&fixture(name), topic).unwrap_err().to_string();
     let several = refused("imu.bag", None);

@@ -17,7 +17,7 @@ const ARDUPILOT: &[u8] = include_bytes!("../ardupilot/fixtures/two-sensors.bin")
 #[test]
 fn the_two_sensors_of_a_log_are_joined_on_the_times_of_one() {
     let (bench, mut options) = log("flight.bin", ARDUPILOT);
-    options.log.instance = Some(1);
+    options.log.instance = Some(Instance::Number(1));
     let (summary, batch, manifest) = bench.import(&options).unwrap();
     assert_eq!((summary.sample_rate_hz, summary.time.len()), (800.0, 2));
     // Its times are TimeUS and SampleUS.
@@ -53,7 +53,7 @@ fn the_two_sensors_of_a_log_are_joined_on_the_times_of_one() {
 #[test]
 fn what_does_not_go_with_a_log_is_refused() {
     let (bench, mut options) = log("flight.bin", ARDUPILOT);
-    options.log.instance = Some(0);
+    options.log.instance = Some(Instance::Number(0));
     options.log.filters = vec!["channel=3".parse().unwrap()];
     says(
         &bench.refused(&options),

@@ -172,9 +172,15 @@ fn phyphox_is_read_with_every_separator_that_it_exports() {
                 "Raw Data.csv",
                 &file("Linear Acceleration", "m/s^2", [0.0; 3]),
             ),
-            ("other.csv", &file("Magnetic field", "µT", [0.0; 3])),
+            ("other.csv", &file("Pressure", "hPa", [0.0; 3])),
         ]);
         right(bench.import_with(None, &["."]), "phyphox", 50.0);
+        let field = file("Magnetic field", "µT", [20.5, -1.25, 40.0]);
+        std::fs::write(bench.path("Magnetometer.csv"), field).unwrap();
+        let (summary, batch, _) = bench.import_with(None, &["."]).unwrap();
+        assert_eq!(summary.triads.last(), Some(&crate::TriadName::MAG));
+        let y = batch.values(crate::Column::of(crate::TriadName::MAG, 1));
+        assert!(y.unwrap().iter().all(|y| *y == -1.25));
         let files = ["Accelerometer.csv", "Gyroscope.csv"];
         right(bench.import_with(Some("phyphox"), &files), "phyphox", 50.0);
         let error = bench

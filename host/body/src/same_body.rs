@@ -1,0 +1,320 @@
+//! Further gyros and accelerometers: two on one body feel the same motion.
+//!
+//! At every instant `ω = C₂ u₂ + o₂` for the compensated rate ω of the first gyro, and `a + ω'×r + ω×(ω×r) = C₂ u₂ + o₂` for the compensated specific force a of
+//! the first accelerometer and the arm r to the second. Both are compared in integrals over windows, so that nothing is differentiated: of ω' there remains
+//! the difference of two rates, and of a delay τ the difference of two readings. Both are linear in C, o and r; τ is found by steps.
+
+use mimu::triad::{Part, affine};
+use mimu_core::compensation::Affine;
+use mimu_recording::TriadKind;
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+
+use crate::clustered::{Clusters, Solution};
+use crate::pieces::{Groups, Pieces};
+use crate::series::{Motion, Series};
+
+/// Length of a window, s. Longer ones average out what a hand does in less; shorter ones cost time and gain nothing.
+pub(crate) const WINDOW_S: f64 = 0.2;
+/// Fewest samples in a window.
+const FEWEST: usize = 4;
+/// A rate above which a window is one of motion, rad/s. Its errors are those of stamps and of the carrier, and larger than at rest.
+const MOVING: f64 = 0.1;
+/// What is known of a delay and of an arm beforehand, standard deviations, s and m.
+const DELAY_S: f64 = 0.05;
+const ARM_M: f64 = 0.2;
+/// Most steps, and the change of the delay at which they end, s.
+const STEPS: usize = 20;
+const SETTLED_S: f64 = 1e-7;
+/// Longest step of the delay, s: beyond a fifth of a second's motion the difference of two readings says little.
+const LONGEST_STEP_S: f64 = 0.03;
+
+/// Parameters: C by rows, o, delay (s), and the arm (m) of an accelerometer.
+const DELAY: usize = 12;
+const ARM: usize = 13;
+
+/// What a further triad is compared with.
+pub(crate) struct Reference<'a> {
+    /// Motion by the first gyro; an accelerometer without one has no arm.
+    pub motion: Option<&'a Motion>,
+    /// Compensated readings of the first triad of its kind, SI.
+    pub series: &'a Series,
+    /// Variance of white noise of these, SI².
+    pub noise: f64,
+}
+
+/// The relation of a further triad to the first of its kind.
+pub(crate) struct Relation {
+    /// C and o, raw to SI, in the frame of the reference.
+    pub calibration: Affine<f64>,
+    /// Covariance of all parameters by the jackknife, and its degrees of freedom.
+    pub covariance: DMatrix<f64>,
+    pub dof: f64,
+    /// Delay, s, and arm, m.
+    pub delay_s: f64,
+    pub arm_m: Vector3<f64>,
+    /// Share of what was known beforehand that delay and arm (its worst direction) still have as their standard deviation.
+    pub undetermined: [f64; 2],
+    /// Rms over windows, in sample and held out, of the mean reading, SI; the same by white noise.
+    pub rms: f64,
+    pub held_out_rms: f64,
+    pub noise_floor: f64,
+    pub windows: usize,
+    pub left_out: Vec<[f64; 2]>,
+}
+
+/// A window: samples `from..=to` of the further triad.
+#[derive(Clone, Copy)]
+struct Window {
+    from: usize,
+    to: usize,
+    piece: usize,
+    moves: bool,
+}
+
+struct Problem<'a> {
+    reference: &'a Reference<'a>,
+    raw: &'a Series,
+    windows: Vec<Window>,
+    pieces: Pieces,
+    parameters: usize,
+}
+
+/// The integral of the reference over a window that begins and ends so much earlier, and its derivatives by arm and delay.
+struct Integral {
+    sum: Vector3<f64>,
+    by_arm: Matrix3<f64>,
+    by_delay: Vector3<f64>,
+}
+
+impl Relation {
+    /// Of a triad's raw readings. `None` if the motion does not determine it.
+    pub fn of(kind: TriadKind, raw: &Series, reference: &Reference) -> Option<Self> {
+        let problem = Problem::new(kind, raw, reference)?;
+        let mut at = problem.start()?;
+        let mut groups = Groups::default();
+        let mut used = vec![true; problem.pieces.count];
+        let mut solution = None;
+        for round in 0..4 {
+            solution = Some(problem.settle(&mut at, &mut groups, &used)?);
+            let held = &solution.as_ref()?.held_out;
+            let next = problem.pieces.kept(held);
+            if round == 3 || next == used {
+                break;
+            }
+            used = next;
+        }
+        problem.relation(&at, &solution?, &used)
+    }
+
+    /// The part of the covariance of C and o.
+    pub fn part(&self) -> Part {
+        Part {
+            covariance: self.covariance.fixed_view::<12, 12>(0, 0).into_owned(),
+            dof: self.dof,
+            known: 0.0,
+        }
+    }
+}
+
+impl<'a> Problem<'a> {
+    fn new(kind: TriadKind, raw: &'a Series, reference: &'a Reference<'a>) -> Option<Self> {
+        let samples = ((WINDOW_S / raw.period).round() as usize).max(FEWEST);
+        let pieces = Pieces::over(&raw.t)?;
+        let mut windows = Vec::new();
+        let mut from = 0;
+        while from + samples < raw.len() {
+            let to = from + samples;
+            if !raw.is_broken(from, to) {
+                let middle = 0.5 * (raw.t[from] + raw.t[to]);
+                let rate = reference.motion.and_then(|m| m.rate.at(middle));
+                windows.push(Window {
+                    from,
+                    to,
+                    piece: pieces.of(middle),
+                    moves: rate.is_some_and(|rate| rate.norm() > MOVING),
+                });
+            }
+            from = to;
+        }
+        let arm = kind == TriadKind::Accel && reference.motion.is_some();
+        Some(Self {
+            reference,
+            raw,
+            windows,
+            pieces,
+            parameters: if arm { ARM + 3 } else { DELAY + 1 },
+        })
+    }
+
+    /// C and o without delay and arm, by plain least squares.
+    fn start(&self) -> Option<DVector<f64>> {
+        let mut normal = DMatrix::<f64>::zeros(4, 4);
+        let mut right = DMatrix::<f64>::zeros(4, 3);
+        for window in &self.windows {
+            let Some(integral) = self.integral(window, 0.0) else {
+                continue;
+            };
+            let (sum, time) = self.raw_integral(window);
+            let row = DVector::from_vec(vec![sum.x, sum.y, sum.z, time]);
+            normal += &row * row.transpose();
+            right += &row * integral.sum.transpose();
+        }
+        let scale = normal.diagonal().map(|d| d.sqrt());
+        let scaled = DMatrix::from_fn(4, 4, |i, j| normal[(i, j)] / scale[i] / scale[j]);
+        if !(scaled.clone().symmetric_eigen().eigenvalues.min() > 1e-9) {
+            return None;
+        }
+        let found = scaled.try_inverse()? * DMatrix::from_fn(4, 3, |i, j| right[(i, j)] / scale[i]);
+        let mut at = DVector::zeros(self.parameters);
+        for axis in 0..3 {
+            for k in 0..3 {
+                at[3 * axis + k] = found[(k, axis)] / scale[k];
+            }
+            at[9 + axis] = found[(3, axis)] / scale[3];
+        }
+        Some(at)
+    }
+
+    /// Integral of the raw readings, and the time.
+    fn raw_integral(&self, window: &Window) -> (Vector3<f64>, f64) {
+        let mut sum = Vector3::zeros();
+        for k in window.from..window.to {
+            let between = self.raw.t[k + 1] - self.raw.t[k];
+            sum += 0.5 * between * (self.raw.x[k] + self.raw.x[k + 1]);
+        }
+        (sum, self.raw.t[window.to] - self.raw.t[window.from])
+    }
+
+    fn integral(&self, window: &Window, delay: f64) -> Option<Integral> {
+        let mut sum = Vector3::zeros();
+        let mut turning = Matrix3::zeros();
+        let mut last: Option<(f64, Vector3<f64>, Matrix3<f64>)> = None;
+        let rate = |t: f64| match self.parameters > ARM {
+            true => self.reference.motion?.rate.at(t),
+            false => Some(Vector3::zeros()),
+        };
+        for k in window.from..=window.to {
+            let t = self.raw.t[k] - delay;
+            let x = self.reference.series.at(t)?;
+            let square = {
+                let cross = rate(t)?.cross_matrix();
+                cross * cross
+            };
+            if let Some((before, x0, square0)) = last {
+                sum += 0.5 * (t - before) * (x0 + x);
+                turning += 0.5 * (t - before) * (square0 + square);
+            }
+            last = Some((t, x, square));
+        }
+        let [from, to] = [window.from, window.to].map(|k| self.raw.t[k] - delay);
+        Some(Integral {
+            sum,
+            by_arm: (rate(to)? - rate(from)?).cross_matrix() + turning,
+            by_delay: self.reference.series.at(to)? - self.reference.series.at(from)?,
+        })
+    }
+
+    /// Residual of a window (a mean, SI) and its derivatives, an axis each.
+    fn residual(&self, window: &Window, at: &DVector<f64>) -> Option<(Vector3<f64>, DMatrix<f64>)> {
+        let integral = self.integral(window, at[DELAY])?;
+        let (sum, time) = self.raw_integral(window);
+        let calibration = affine(&at.fixed_rows::<12>(0).into_owned());
+        let mut residual = integral.sum - calibration.matrix * sum - calibration.offset * time;
+        let mut by = DMatrix::zeros(3, self.parameters);
+        for axis in 0..3 {
+            for k in 0..3 {
+                by[(axis, 3 * axis + k)] = sum[k] / time;
+            }
+            by[(axis, 9 + axis)] = 1.0;
+            by[(axis, DELAY)] = integral.by_delay[axis] / time;
+        }
+        if self.parameters > ARM {
+            residual += integral.by_arm * at.fixed_rows::<3>(ARM);
+            by.fixed_view_mut::<3, 3>(0, ARM)
+                .copy_from(&(-integral.by_arm / time));
+        }
+        Some((residual / time, by))
+    }
+
+    /// Steps until delay and weights stand still; returns the last solution, whose step is then nearly zero.
+    fn settle(
+        &self,
+        at: &mut DVector<f64>,
+        groups: &mut Groups,
+        used: &[bool],
+    ) -> Option<Solution> {
+        let mut last = None;
+        for _ in 0..STEPS {
+            let solution = self.clusters(at, groups, used).solve(used)?;
+            let mut step = solution.step.clone();
+            let longest = step[DELAY].abs() / LONGEST_STEP_S;
+            if longest > 1.0 {
+                step /= longest;
+            }
+            *at += &step;
+            let is_settled = step[DELAY].abs() < SETTLED_S;
+            last = Some(solution);
+            if is_settled && groups.are_settled() {
+                break;
+            }
+        }
+        last
+    }
+
+    fn clusters(&self, at: &DVector<f64>, groups: &mut Groups, used: &[bool]) -> Clusters {
+        let mut known = DVector::repeat(self.parameters, f64::INFINITY);
+        known[DELAY] = DELAY_S;
+        for k in ARM..self.parameters {
+            known[k] = ARM_M;
+        }
+        let zero = DVector::zeros(self.parameters);
+        let mut clusters = Clusters::new(self.pieces.count, at, &zero, &known);
+        groups.begin();
+        for window in &self.windows {
+            let Some((residual, by)) = self.residual(window, at) else {
+                continue;
+            };
+            let group = usize::from(window.moves);
+            if used[window.piece] {
+                groups.count(group, residual.norm_squared(), 3.0);
+            }
+            let weight = groups.weight(group);
+            for axis in 0..3 {
+                let row = by.row(axis).transpose();
+                clusters.add(window.piece, residual[axis], &row, weight);
+            }
+        }
+        groups.end();
+        clusters
+    }
+
+    fn relation(&self, at: &DVector<f64>, solution: &Solution, used: &[bool]) -> Option<Relation> {
+        let calibration = affine(&at.fixed_rows::<12>(0).into_owned());
+        // Noise of a mean of n samples, trapezoids: the ends count half.
+        let per_window = (WINDOW_S / self.raw.period).max(FEWEST as f64);
+        let own = self.raw.noise() * calibration.matrix.norm_squared() / 3.0;
+        let noise = (own + self.reference.noise) / per_window;
+        let windows = self.windows.iter().filter(|w| used[w.piece]);
+        let residuals = windows.filter_map(|w| Some(self.residual(w, at)?.0.norm_squared() / 3.0));
+        let residuals: Vec<f64> = residuals.collect();
+        let rms = (residuals.iter().sum::<f64>() / residuals.len() as f64).sqrt();
+        let share = |k: usize, prior: f64| solution.by_weights[(k, k)].sqrt() / prior;
+        let arm = (ARM..self.parameters).map(|k| share(k, ARM_M));
+        Some(Relation {
+            calibration,
+            covariance: solution.covariance.clone(),
+            dof: solution.dof,
+            delay_s: at[DELAY],
+            arm_m: match self.parameters > ARM {
+                true => at.fixed_rows::<3>(ARM).into_owned(),
+                false => Vector3::zeros(),
+            },
+            undetermined: [share(DELAY, DELAY_S), arm.fold(0.0, f64::max)],
+            rms,
+            held_out_rms: rms * solution.unseen(used),
+            noise_floor: noise.sqrt(),
+            windows: residuals.len(),
+            left_out: self.pieces.spans(used),
+        })
+    }
+}
