@@ -94,8 +94,14 @@ pub(crate) fn placed(of: &Affine<f64>, parts: &[Part]) -> Option<Placed> {
         let (up, down) = (moved(step)?, moved(-step)?);
         let own = vector(&up.0.matrix, &up.0.offset) - vector(&down.0.matrix, &down.0.offset);
         by_own.set_column(k, &(own / (2.0 * step)));
-        let turned = (up.1 * down.1.inverse()).scaled_axis();
-        by_rotation.set_column(k, &(turned / (2.0 * step)));
+        // Of a rotation by next to nothing, `scaled_axis` may give NaN.
+        let turned = (up.1 * down.1.inverse()).into_inner();
+        let turned = Vector3::new(
+            turned[(2, 1)] - turned[(1, 2)],
+            turned[(0, 2)] - turned[(2, 0)],
+            turned[(1, 0)] - turned[(0, 1)],
+        );
+        by_rotation.set_column(k, &(0.5 * turned / (2.0 * step)));
     }
     let triad = Triad::from_inverse(own, parts.iter().map(|p| p.seen_by(&by_own)).collect())?;
     let angles = rotation.scaled_axis();
