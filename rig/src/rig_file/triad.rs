@@ -114,10 +114,8 @@ impl TriadFile {
 impl RigFile {
     /// Returns the first error of the further triads.
     pub(super) fn check_triads(&self) -> Result<(), Refusal> {
-        let triads = self.triad.iter().enumerate();
-        triads
-            .map(|(i, triad)| triad.check(self, i))
-            .collect::<Result<(), _>>()?;
+        let mut triads = self.triad.iter().enumerate();
+        triads.try_for_each(|(i, triad)| triad.check(self, i))?;
         self.field.as_ref().map_or(Ok(()), |field| field.check())
     }
 
