@@ -21,6 +21,7 @@ fn main() {
         let motion = Motion {
             t_s: 0.0,
             attitude: Rotation::NONE,
+            position: [0.0; 3],
             rate: [0.1, 0.2, 0.3],
             angular_acceleration: [0.0; 3],
             force: [0.0, 0.0, 9.8],

@@ -14,19 +14,39 @@ pub enum MeasuredQuantity {
     Gyro,
     /// Specific force; the catalog's input unit is g.
     Accel,
+    /// Magnetic field, µT everywhere.
+    Mag,
 }
 
 impl MeasuredQuantity {
-    /// SI in one input unit of the catalog.
+    /// The unit of its input in models (rad/s, m/s², µT) in one input unit of the catalog.
     pub fn si(self) -> f64 {
         match self {
             Self::Gyro => crate::effects::DPS,
             Self::Accel => crate::effects::G,
+            Self::Mag => 1.0,
+        }
+    }
+
+    /// The unit of its input in models.
+    pub fn unit(self) -> &'static str {
+        match self {
+            Self::Gyro => "rad/s",
+            Self::Accel => "m/s^2",
+            Self::Mag => "uT",
+        }
+    }
+
+    /// The triad relative to which a further one of its kind is described.
+    pub fn reference(self) -> &'static str {
+        match self {
+            Self::Gyro | Self::Mag => "gyro",
+            Self::Accel => "accel",
         }
     }
 }
 
-/// One type of sensor. "raw" is V or counts, "input" is deg/s or g.
+/// One type of sensor. "raw" is V or counts, "input" is deg/s, g or µT.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Sensor {
@@ -89,6 +109,7 @@ pub fn sensors() -> &'static [Sensor] {
             include_str!("catalog/msg7100d_300.toml"),
             include_str!("catalog/msg7100d_3600.toml"),
             include_str!("catalog/msa6000d_50.toml"),
+            include_str!("catalog/ak8963.toml"),
         ]
         .iter()
         .map(|text| toml::from_str(text).expect("the catalog is read by a test"))

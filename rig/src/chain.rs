@@ -145,19 +145,13 @@ impl Frame {
         }
     }
 
-    /// Motion of a board in this frame, at the lever `lever` (m, this frame's axes) from a pivot with `velocity` and `acceleration` relative to the
-    /// ground (m/s, m/s², level axes).
+    /// Motion of a board in this frame, at the lever `lever` (m, this frame's axes) from a pivot that moves relative to the ground (m, level axes).
     ///
     /// The rate against inertial space includes the lever's Coriolis acceleration and the change of the Earth's centrifugal acceleration along it.
     /// The gradient of gravity is neglected, 3e-6 m/s² per metre.
-    pub fn motion(
-        self,
-        t_s: f64,
-        place: &Place,
-        lever: Vector,
-        velocity: Vector,
-        acceleration: Vector,
-    ) -> Motion {
+    pub fn motion(self, t_s: f64, place: &Place, lever: Vector, pivot: [Jet; 3]) -> Motion {
+        let velocity = pivot.map(|p| p.rate);
+        let acceleration = pivot.map(|p| p.acceleration);
         let coriolis = scale(2.0, cross(place.earth_rate(), velocity));
         let level = add(place.force_at_rest(), add(acceleration, coriolis));
         let euler = cross(self.angular_acceleration, lever);
@@ -165,6 +159,7 @@ impl Frame {
         Motion {
             t_s,
             attitude: self.attitude,
+            position: add(pivot.map(|p| p.value), self.attitude.turn(lever)),
             rate: self.rate,
             angular_acceleration: self.angular_acceleration,
             force: add(self.attitude.inverse().turn(level), add(euler, centripetal)),

@@ -206,6 +206,12 @@ impl Shake {
     }
 }
 
+/// Slow tumble of a board in the hand: band, rms angle about each of three axes in a row, and rms displacement along each. 50 deg/s about each axis on
+/// average, and every attitude within a minute.
+const TUMBLE_HZ: [f64; 2] = [0.04, 0.12];
+const TUMBLE_DEG: f64 = 100.0;
+const TUMBLE_MM: f64 = 30.0;
+
 /// A person who carries out a plan, or commands.
 #[derive(Debug, Clone)]
 pub struct Hands {
@@ -218,6 +224,7 @@ pub struct Hands {
     sway: Shake,
     shake: Shake,
     wobble: Shake,
+    tumble: Shake,
     jolt_s: f64,
     still: Option<(usize, Motion)>,
     /// State under command; `None` if there is a plan.
@@ -251,6 +258,9 @@ impl Hands {
                         (Some(whole), Some(last)) => {
                             Turn::whole(last, at_s, step, whole, truth, random)
                         }
+                        (None, Some(last)) if step.tumble_s.is_some() => {
+                            Turn::tumble(last, at_s, step, truth, random)
+                        }
                         (_, last) => Turn::draw(last, at_s, step, up, truth, random),
                     };
                     end_s = turn.dwell[1] + between(truth.pause_s, random);
@@ -263,6 +273,9 @@ impl Hands {
             let mrad = 1e3 * truth.wobble_deg.to_radians();
             hands.wobble = Shake::new(random, band, mrad, truth.sway_mm);
         }
+        // A separate stream: a tumble changes nothing of the other turns.
+        let tumble = &mut Random::new(seed, "tumble");
+        hands.tumble = Shake::new(tumble, TUMBLE_HZ, 1e3 * TUMBLE_DEG.to_radians(), TUMBLE_MM);
         (hands.turns, hands.duration_s) = (turns, end_s);
         Ok(hands)
     }
@@ -280,6 +293,7 @@ impl Hands {
             tremor,
             shake: sway.clone(),
             wobble: sway.clone(),
+            tumble: sway.clone(),
             sway,
             jolt_s: truth.jolt_s,
             still: None,
@@ -356,6 +370,9 @@ impl Hands {
         if turning && turn.whole.is_some() {
             shift.add(&self.wobble.at(t_s), detour);
         }
+        if turning && turn.tumbles {
+            shift.add(&self.tumble.at(t_s), turn.tumbling(t_s));
+        }
         if turning && turn.shaken {
             shift.add(&self.shake.at(t_s), detour);
         }
@@ -403,13 +420,7 @@ impl Hands {
             .about_own::<0>(detour.times(turn.wander[0]) + shift.angle[0])
             .about_own::<1>(detour.times(turn.wander[1]) + shift.angle[1])
             .about_own::<2>(shift.angle[2])
-            .motion(
-                t_s,
-                &self.place,
-                self.lever,
-                shift.position.map(|p| p.rate),
-                shift.position.map(|p| p.acceleration),
-            )
+            .motion(t_s, &self.place, self.lever, shift.position)
     }
 }
 

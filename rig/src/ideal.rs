@@ -149,7 +149,7 @@ fn product(a: &[Vector; 3], b: &[Vector; 3]) -> [Vector; 3] {
 }
 
 /// The columns of the inverse are the vector products of the rows, divided by their volume.
-fn invert(m: &[Vector; 3]) -> Option<[Vector; 3]> {
+pub(crate) fn invert(m: &[Vector; 3]) -> Option<[Vector; 3]> {
     let columns = [cross(m[1], m[2]), cross(m[2], m[0]), cross(m[0], m[1])];
     let volume = dot(m[0], columns[0]);
     (volume != 0.0).then(|| std::array::from_fn(|i| columns.map(|c| c[i] / volume)))

@@ -6,7 +6,7 @@
 //! | the experiment                 |                                                                   |
 //! |--------------------------------|-------------------------------------------------------------------|
 //! | [`plan`], [`located`]          | PLAN.toml; error messages with the line                           |
-//! | [`place`]                      | gravity and the Earth's rotation                                  |
+//! | [`place`], [`field`]           | gravity and the Earth's rotation; the magnetic field              |
 //! | [`table`], [`axis`]            | a turntable with its flaws                                        |
 //! | [`hands`]                      | a person                                                          |
 //! | [`flaws`]                      | flaws of real recordings                                          |
@@ -17,6 +17,7 @@
 //! | the unit                       |                                                                   |
 //! |--------------------------------|-------------------------------------------------------------------|
 //! | [`mod@unit`], [`sensor`], [`filter`] | from motion and chamber to the voltages at the pins         |
+//! | [`body`]                       | triads beyond the first gyro and accelerometer                    |
 //! | [`noise`], [`thermal`]         | disturbances of every sensor                                      |
 //! | [`effects`]                    | errors that the affine model lacks, enabled one by one            |
 //! | [`curves`]                     | each sensor over the temperature of its die                       |
@@ -26,12 +27,14 @@
 //! | [`ideal`]                      | forward models of papers, for Monte Carlo studies                 |
 
 pub mod axis;
+pub mod body;
 pub mod catalog;
 pub mod chain;
 pub mod command;
 pub mod converter;
 pub mod curves;
 pub mod effects;
+pub mod field;
 pub mod filter;
 pub mod flaws;
 pub mod hands;

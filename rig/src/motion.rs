@@ -9,6 +9,8 @@ pub struct Motion {
     pub t_s: f64,
     /// Body axes into level axes: east, north, up.
     pub attitude: Rotation,
+    /// Position of the board's origin on the bench, level axes, m.
+    pub position: Vector,
     /// Angular rate against inertial space (including the Earth's), body axes, rad/s.
     pub rate: Vector,
     /// Time derivative of `rate`, body axes, rad/s².

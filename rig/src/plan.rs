@@ -80,6 +80,8 @@ pub struct Step {
     pub turn: Option<Turn>,
     /// Whole turns by hand before the dwell.
     pub whole: Option<WholeTurns>,
+    /// Duration of a slow tumble by hand before the dwell, s.
+    pub tumble_s: Option<f64>,
     /// Duration of each dwell, s; for a turn, without its ramps.
     pub dwell_s: f64,
     /// Successive dwells in each pose.
@@ -97,6 +99,7 @@ impl Step {
             spin: 0.0,
             turn: None,
             whole: None,
+            tumble_s: None,
             dwell_s,
             repeat: 1,
             at: Places::default(),

@@ -5,17 +5,20 @@ mod storage;
 
 use std::path::{Path, PathBuf};
 
+use crate::body::Further;
 use crate::converter::{Converter, Readings};
+use crate::field::FieldTruth;
 use crate::flaws::{Flaws, Lost};
 use crate::hands::Hands;
 use crate::motion::{Carrier, Instant};
 use crate::plan::{CarriedBy, Plan, Samples};
 use crate::rig_file::RigTruth;
+use crate::rotation::Vector;
 use crate::table::Table;
 use crate::unit::Unit;
 
 /// One sample: the truth, and the device's readings.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Row {
     /// Motion, step, and the table's reported values.
     pub instant: Instant,
@@ -23,6 +26,8 @@ pub struct Row {
     pub stamp_s: f64,
     /// Raw readings.
     pub readings: Readings,
+    /// Raw readings of the further triads; NaN: empty cells.
+    pub further: Vec<Vector>,
 }
 
 /// A plan being carried out: an iterator over its samples.
@@ -31,6 +36,8 @@ pub struct Run<'a> {
     carrier: Box<dyn Carrier>,
     unit: Unit,
     converter: Converter,
+    further: Vec<Further>,
+    field: FieldTruth,
     flaws: Flaws,
     lost: Lost,
     next: usize,
@@ -48,14 +55,22 @@ pub fn samples<'a>(plan: &'a Plan, truth: &RigTruth, seed: u64) -> Result<Run<'a
     if !truth.earth_rate {
         at.place.rotation = 0.0;
     }
-    let carrier: Box<dyn Carrier> = match plan.carrier {
-        CarriedBy::Table => Box::new(Table::new(&at, &truth.table)?),
-        CarriedBy::Hands => {
-            Box::new(Hands::new(&at, &truth.hands, seed)?.with_flaws(&truth.flaws, seed))
-        }
+    let carrier = || -> Result<Box<dyn Carrier>, String> {
+        Ok(match plan.carrier {
+            CarriedBy::Table => Box::new(Table::new(&at, &truth.table)?),
+            CarriedBy::Hands => {
+                Box::new(Hands::new(&at, &truth.hands, seed)?.with_flaws(&truth.flaws, seed))
+            }
+        })
     };
-    plan.check_length(carrier.duration_s())?;
+    // The same motion again for each further triad, which gets it at other times.
     let period_s = 1.0 / plan.sample_rate_hz;
+    let further = truth.further.iter();
+    let further = further
+        .map(|of| Ok(Further::new(of, carrier()?, period_s, seed)))
+        .collect::<Result<_, String>>()?;
+    let carrier = carrier()?;
+    plan.check_length(carrier.duration_s())?;
     let dwells = plan.dwells();
     // All samples before the end. The ends of dwells are sums: a sample that is late by a rounding error still counts.
     let count = (carrier.duration_s() * plan.sample_rate_hz - 1e-6).ceil() as usize;
@@ -68,6 +83,8 @@ pub fn samples<'a>(plan: &'a Plan, truth: &RigTruth, seed: u64) -> Result<Run<'a
         carrier,
         unit: Unit::new(&truth.unit, seed, period_s),
         converter: Converter::new(&truth.converter, &truth.unit, seed),
+        further,
+        field: truth.field.clone(),
         flaws: Flaws::new(&truth.flaws, dwells, period_s, seed),
         next: 0,
     })
@@ -106,10 +123,13 @@ impl Run<'_> {
         let pins = self.unit.step(&sensed, self.plan.chamber_c(t_s));
         let mut readings = self.converter.read(&pins);
         readings.temp_c = self.flaws.thermometer(t_s, readings.temp_c);
+        let further = self.further.iter_mut();
+        let further = further.map(|triad| triad.read(t_s, &self.flaws, &self.field));
         Row {
             instant,
             stamp_s,
             readings,
+            further: further.collect(),
         }
     }
 }

@@ -62,6 +62,15 @@ impl TriadTruth {
             axis.null = bias[i];
         }
     }
+
+    /// Lag of its low-passes behind a slow input, mean of the axes, s.
+    pub fn lag_s(&self) -> f64 {
+        let per_hz = |hz: f64| 1.0 / (std::f64::consts::TAU * hz);
+        let axes = self.axes.iter();
+        axes.map(|a| per_hz(a.bandwidth_hz) + per_hz(a.rc_hz))
+            .sum::<f64>()
+            / 3.0
+    }
 }
 
 /// State of one axis.

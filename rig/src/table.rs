@@ -138,7 +138,7 @@ impl Table {
             cosine[MIDDLE],
         ];
         Instant {
-            motion: body.motion(t_s, &self.place, self.offset, [0.0; 3], [0.0; 3]),
+            motion: body.motion(t_s, &self.place, self.offset, [Jet::default(); 3]),
             step,
             stated_rate: Some([
                 rate[OUTER] * up[0] + rate[MIDDLE] * cosine[INNER],

@@ -13,6 +13,7 @@
 //! | [`earth`]              | the Earth's rate in the biases of gyros on a table                |
 //! | [`recordings`]         | recordings by other people                                        |
 //! | [`planted`]            | effects of the bench, planted in them                             |
+//! | [`body`]                         | bodies of several triads by hand                                   |
 //! | [`noise_in_use`], [`flight`] | noise in motion of units that are wrong in a known way, by rests and by a trajectory |
 //! | [`niu`]                | niu's tables                                                      |
 //! | [`page`]               | tables in documents, between markers                              |
@@ -26,6 +27,7 @@
 
 pub mod bench;
 pub mod blind;
+pub mod body;
 pub mod by_hand;
 pub mod coverage;
 pub mod earth;

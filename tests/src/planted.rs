@@ -712,6 +712,7 @@ fn motions(samples: &Batch, sheet: &DataSheet, gravity_mps2: f64) -> Vec<Motion>
         motions.push(Motion {
             t_s: samples.t_s[row] - samples.t_s[0],
             attitude,
+            position: [0.0; 3],
             rate,
             angular_acceleration: [0.0; 3],
             force,

@@ -20,10 +20,10 @@ pub(crate) struct Rest {
     pub up: Vector3<f64>,
 }
 
-/// Compensated readings, and variances of their white noise, SI².
+/// Compensated readings, SI.
 pub(crate) struct Carrier {
-    motion: Option<(Motion, f64)>,
-    force: Option<(Series, f64)>,
+    motion: Option<Motion>,
+    force: Option<Series>,
 }
 
 /// What a further gyro or accelerometer is compared with.
@@ -32,11 +32,15 @@ pub(crate) struct Reference<'a> {
     pub motion: Option<&'a Motion>,
     /// Compensated readings of the first triad of its kind, SI.
     pub series: &'a Series,
-    /// Variance of white noise of these, SI².
-    pub noise: f64,
 }
 
 impl Reference<'_> {
+    /// Variance of the noise of a mean over so long, SI².
+    pub fn noise_of_means(&self, time_s: f64) -> f64 {
+        let count = (time_s / self.series.period).round() as usize;
+        self.series.noise_of_means(count)
+    }
+
     /// Rms of an axis, SI.
     pub fn signal(&self) -> f64 {
         let squares = self.series.x.iter().map(|x| x.norm_squared());
@@ -137,38 +141,34 @@ impl Carrier {
     /// Of the first triads, as far as they have models, raw to SI.
     pub fn read(recording: &Recording, models: &PerSensor<Option<Affine<f64>>>) -> Result<Self> {
         let there = recording.triads();
-        let series = |sensor: Sensor| -> Result<Option<(Series, f64)>> {
+        let series = |sensor: Sensor| -> Result<Option<Series>> {
             let model = models[sensor].filter(|_| there.contains(&first(sensor)));
             let Some(model) = model else {
                 return Ok(None);
             };
             let raw = read(recording, first(sensor))?;
-            let noise = raw.noise() * model.matrix.norm_squared() / 3.0;
-            Ok(Some((raw.map(|u| model.apply(u)), noise)))
+            Ok(Some(raw.map(|u| model.apply(u))))
         };
-        let motion = series(Sensor::Gyro)?;
         Ok(Self {
-            motion: motion.map(|(rate, noise)| (Motion::new(rate), noise)),
+            motion: series(Sensor::Gyro)?.map(Motion::new),
             force: series(Sensor::Accel)?,
         })
     }
 
     /// Its motion by the gyro.
     pub fn motion(&self) -> Option<&Motion> {
-        self.motion.as_ref().map(|(motion, _)| motion)
+        self.motion.as_ref()
     }
 
     /// What a further triad of this kind is compared with.
     pub fn reference(&self, sensor: Sensor) -> Option<Reference<'_>> {
-        let motion = self.motion.as_ref();
-        let (series, noise) = match sensor {
-            Sensor::Gyro => motion.map(|(motion, noise)| (&motion.rate, *noise))?,
-            Sensor::Accel => self.force.as_ref().map(|(force, noise)| (force, *noise))?,
+        let series = match sensor {
+            Sensor::Gyro => &self.motion()?.rate,
+            Sensor::Accel => self.force.as_ref()?,
         };
         Some(Reference {
             motion: self.motion(),
             series,
-            noise,
         })
     }
 }

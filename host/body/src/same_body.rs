@@ -65,6 +65,8 @@ struct Problem<'a> {
     reference: &'a Reference<'a>,
     raw: &'a Series,
     windows: Vec<Window>,
+    /// Samples between the ends of a window.
+    samples: usize,
     pieces: Pieces,
     parameters: usize,
 }
@@ -150,6 +152,7 @@ impl<'a> Problem<'a> {
             reference,
             raw,
             windows,
+            samples,
             pieces,
             parameters: if arm { ARM + 3 } else { DELAY + 1 },
         })
@@ -300,10 +303,8 @@ impl<'a> Problem<'a> {
     /// Errors in sample at these parameters, over the pieces of time that are `used`. `None` without a window.
     fn errors(&self, at: &DVector<f64>, used: &[bool]) -> Option<Errors> {
         let calibration = affine(&at.fixed_rows::<12>(0).into_owned());
-        // Noise of a mean of n samples, trapezoids: the ends count half.
-        let per_window = (WINDOW_S / self.raw.period).max(FEWEST as f64);
-        let own = self.raw.noise() * calibration.matrix.norm_squared() / 3.0;
-        let noise = (own + self.reference.noise) / per_window;
+        let own = self.raw.noise_of_means(self.samples) * calibration.matrix.norm_squared() / 3.0;
+        let noise = own + self.reference.noise_of_means(WINDOW_S);
         let windows = self.windows.iter().filter(|w| used[w.piece]);
         let squares = windows.filter_map(|w| Some(self.residual(w, at)?.0.norm_squared() / 3.0));
         let squares: Vec<f64> = squares.collect();

@@ -125,20 +125,42 @@ impl Series {
         self.broken[from..to].contains(&true)
     }
 
-    /// Variance of white noise of a reading, mean over the axes: that of third differences, by the quietest quarter of the pieces. What moves slowly against
-    /// four samples cancels.
+    /// Variance of the noise of a reading, mean over the axes. Readings that lie [`APART_S`] apart are compared: the noise of neighbours is alike behind a filter.
     pub fn noise(&self) -> f64 {
-        let third = self.x.windows(4).map(|w| {
-            let difference = w[3] - w[0] + 3.0 * (w[1] - w[2]);
-            difference.norm_squared() / (3.0 * 20.0)
-        });
-        let third: Vec<f64> = third.collect();
-        let mut pieces: Vec<f64> = third
-            .chunks(50)
-            .map(|c| c.iter().sum::<f64>() / c.len() as f64)
-            .collect();
-        mimu_recording::statistics::quantile(&mut pieces, 0.25).unwrap_or(f64::NAN)
+        let stride = (APART_S / self.period).ceil().max(1.0) as usize;
+        let apart: Vec<Vector3<f64>> = self.x.iter().step_by(stride).copied().collect();
+        noise_at_rest(&apart)
     }
+
+    /// Variance of the noise of a mean of so many neighbours, mean over the axes.
+    pub fn noise_of_means(&self, count: usize) -> f64 {
+        let means = self.x.chunks_exact(count.max(1));
+        let means = means.map(|of| of.iter().sum::<Vector3<f64>>() / of.len() as f64);
+        noise_at_rest(&means.collect::<Vec<_>>())
+    }
+}
+
+/// Time between readings whose noise is independent, s: a filter of 10 Hz forgets in less.
+const APART_S: f64 = 0.05;
+
+/// Variance of the noise of these, mean over the axes: that of third differences, in which what moves slowly cancels, by the quiet pieces of time.
+fn noise_at_rest(x: &[Vector3<f64>]) -> f64 {
+    let third = x.windows(4).map(|w| {
+        let difference = w[3] - w[0] + 3.0 * (w[1] - w[2]);
+        difference.norm_squared() / (3.0 * 20.0)
+    });
+    let third: Vec<f64> = third.collect();
+    let pieces = third.chunks(8);
+    let pieces: Vec<f64> = pieces
+        .map(|c| c.iter().sum::<f64>() / c.len() as f64)
+        .collect();
+    // Quiet is up to twice the lower quartile: less would be the lower half of what noise alone gives.
+    let quartile = mimu_recording::statistics::quantile(&mut pieces.clone(), 0.25);
+    let quiet = pieces
+        .iter()
+        .filter(|p| **p <= 2.0 * quartile.unwrap_or(f64::NAN));
+    let (sum, count) = quiet.fold((0.0, 0.0), |(sum, count), p| (sum + p, count + 1.0));
+    sum / count
 }
 
 /// Ends of the ranges of three channels, where they saturate: the ends of a word of bits. A channel in SI may repeat its extreme by chance.

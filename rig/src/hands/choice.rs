@@ -2,11 +2,15 @@
 
 use std::f64::consts::TAU;
 
-use super::HandsTruth;
 use super::even::Even;
+use super::{HandsTruth, smooth_step};
+use crate::chain::Jet;
 use crate::plan::{Step, WholeTurns, attitude};
 use crate::random::Random;
 use crate::rotation::{Rotation, Vector, norm};
+
+/// Longest time in which a tumble begins, and in which it ends, s.
+const TUMBLE_RAMP_S: f64 = 3.0;
 
 /// A turn to the next pose, and the rest there.
 #[derive(Debug, Clone)]
@@ -32,6 +36,8 @@ pub(super) struct Turn {
     pub(super) jolt: Option<Jolt>,
     /// Whether it is shaken violently on the way.
     pub(super) shaken: bool,
+    /// Whether it tumbles slowly on the way.
+    pub(super) tumbles: bool,
     /// Rotation from its pose at which it arrives, rad, and the time to settle, s.
     pub(super) settling: Option<(Vector, f64)>,
     /// Whole turns on the way: axis (unit, body axes before the turn) and angle, rad.
@@ -118,6 +124,7 @@ impl Turn {
                 ..knock
             }),
             shaken: false,
+            tumbles: false,
             whole: None,
             settling: None,
             even: None,
@@ -138,18 +145,50 @@ impl Turn {
         // All choices of a turn, so that those of later turns do not depend on what this one is.
         let mut turn = Turn::draw(Some(last), at_s, step, last.up, truth, random);
         let each_s = between(truth.whole_turn_s, random);
-        let [dwell, end] = turn.dwell;
-        let longer_s = each_s * whole.count.abs() - turn.turn_s;
-        turn.turn_s += longer_s;
-        turn.dwell = [dwell + longer_s, end + longer_s];
-        if let Some(jolt) = &mut turn.jolt {
+        turn.come_back(each_s * whole.count.abs(), truth, random);
+        turn.whole = Some((whole.about, TAU * whole.count));
+        turn
+    }
+
+    /// The tumble of `step` from where the board lies since `last`, and the dwell where it is put back.
+    pub(super) fn tumble(
+        last: &Turn,
+        at_s: f64,
+        step: &Step,
+        truth: &HandsTruth,
+        random: &mut Random,
+    ) -> Turn {
+        let mut turn = Turn::draw(Some(last), at_s, step, last.up, truth, random);
+        turn.come_back(step.tumble_s.unwrap_or_default(), truth, random);
+        turn.tumbles = true;
+        turn
+    }
+
+    /// Makes it take `turn_s` and end where the board lay, but for the error of putting it back.
+    fn come_back(&mut self, turn_s: f64, truth: &HandsTruth, random: &mut Random) {
+        let [dwell, end] = self.dwell;
+        let longer_s = turn_s - self.turn_s;
+        self.turn_s += longer_s;
+        self.dwell = [dwell + longer_s, end + longer_s];
+        if let Some(jolt) = &mut self.jolt {
             jolt.start_s += longer_s;
         }
         let missed = [0; 3].map(|_| random.normal() * truth.put_back_deg.to_radians());
-        (turn.axis, turn.angle) = Rotation::by(missed).axis_angle();
-        turn.position[1] = turn.position[0];
-        turn.whole = Some((whole.about, TAU * whole.count));
-        turn
+        (self.axis, self.angle) = Rotation::by(missed).axis_angle();
+        self.position[1] = self.position[0];
+    }
+
+    /// Share of the tumble at `t_s`: it begins and ends within a quarter of the turn, or [`TUMBLE_RAMP_S`].
+    pub(super) fn tumbling(&self, t_s: f64) -> Jet {
+        let ramp_s = TUMBLE_RAMP_S.min(0.25 * self.turn_s);
+        let ramp = |past_s: f64, sign: f64| {
+            smooth_step(Jet {
+                value: (past_s / ramp_s).min(1.0),
+                rate: sign / ramp_s,
+                acceleration: 0.0,
+            })
+        };
+        ramp(t_s - self.start_s, 1.0) * ramp(self.arrived_s() - t_s, -1.0)
     }
 }
 

@@ -24,6 +24,7 @@ pub(super) struct RawStep {
     pub(super) turn_dps: Option<Spanned<f64>>,
     pub(super) whole_turns: Option<Spanned<f64>>,
     pub(super) about: Option<Spanned<Vector>>,
+    pub(super) tumble_s: Option<Spanned<f64>>,
     pub(super) dwell_s: Option<Spanned<f64>>,
     pub(super) repeat: Option<Spanned<u32>>,
 }
@@ -39,7 +40,9 @@ impl Reader<'_> {
         self.on_table(raw, carrier)?;
         let turn = self.turn(raw)?;
         let whole = self.whole_turns(raw, carrier)?;
-        let (pose, pose_at) = self.pose(raw, &at, turn.is_some() || whole.is_some())?;
+        let tumble_s = self.tumble_s(raw, carrier)?;
+        let turns = turn.is_some() || whole.is_some() || tumble_s.is_some();
+        let (pose, pose_at) = self.pose(raw, &at, turns)?;
         let dwell_s = self.dwell_s(raw, &at, turn.as_ref(), sample_rate_hz)?;
         let repeat = self.repeat(raw)?;
         let place = |value: Option<&Spanned<f64>>| value.map_or(at.clone(), Spanned::span);
@@ -53,6 +56,7 @@ impl Reader<'_> {
             spin: self.angle("spin_dps", &raw.spin_dps, FASTEST_DPS, "degrees per second")?,
             turn,
             whole,
+            tumble_s,
             dwell_s,
             repeat,
             at: Places {
@@ -174,6 +178,24 @@ impl Reader<'_> {
                 .error(&about.span(), "`about` has no length", remedy)
         })?;
         Ok(Some(WholeTurns { count, about }))
+    }
+
+    /// A slow tumble by hand, after which the board is put back.
+    fn tumble_s(&self, raw: &RawStep, carrier: CarriedBy) -> Result<Option<f64>, String> {
+        let Some(tumble_s) = &raw.tumble_s else {
+            return Ok(None);
+        };
+        let refused = |problem, remedy| Err(self.source.error(&tumble_s.span(), problem, remedy));
+        if carrier == CarriedBy::Table {
+            let remedy = "remove it, or set `carrier = \"hands\"`";
+            return refused("`tumble_s` on a table", remedy);
+        }
+        if raw.up.is_some() || raw.poses.is_some() || raw.whole_turns.is_some() {
+            let problem = "`tumble_s` beside a pose or whole turns";
+            return refused(problem, "make it a separate [[step]]");
+        }
+        self.within("tumble_s", tumble_s, [1.0, 3600.0], "s")
+            .map(Some)
     }
 
     fn repeat(&self, raw: &RawStep) -> Result<u32, String> {

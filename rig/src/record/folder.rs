@@ -1,6 +1,6 @@
 //! The folder of a recording and the file of its truth: written completely or not at all.
 
-use std::fmt::Display;
+use std::fmt::{Display, Write as _};
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -173,20 +173,21 @@ pub(super) fn write(
     let head = toml::to_string(&head).expect("numbers and texts only");
     fs::write(new.join(FILES[0]), head).map_err(failed(folder))?;
     let stored = match output.samples {
-        Samples::Csv => storage::csv(&new.join(FILES[1]), plan, run),
-        Samples::Parquet => storage::parquet(&new.join(FILES[2]), plan, run),
+        Samples::Csv => storage::csv(&new.join(FILES[1]), plan, &truth.further, run),
+        Samples::Parquet => storage::parquet(&new.join(FILES[2]), plan, &truth.further, run),
     };
     stored.map_err(failed(folder))?;
     let name = folder.file_name().unwrap_or_default().to_string_lossy();
     let text = format!(
         "{TRUTH}{name}, made with seed {seed}. As a rig file, with the same plan and seed, it\n\
          # makes the same samples again. It is for judging estimates; estimators must not read it.\n\
-         # On a long ramp the dies (gyros x, y, z, accelerometer) lag temp_c by {} s.\n\n{}",
+         # On a long ramp the dies (gyros x, y, z, accelerometer) lag temp_c by {} s.\n{}\n{}",
         truth
             .unit
             .die_lag_behind_reported_s()
             .map(|lag| format!("{lag:.3}"))
             .join(", "),
+        further(truth),
         truth.file.to_toml()
     );
     fs::write(&new_truth, text).map_err(failed(truth_path))?;
@@ -198,6 +199,30 @@ pub(super) fn write(
         .into_iter()
         .filter(|(path, ..)| output.replace && path.symlink_metadata().is_ok());
     put(&away.chain(here).collect::<Vec<_>>()).map_err(|(path, e)| failed(path)(e))
+}
+
+/// Comments on the further triads: their calibrations, as an estimator would give them.
+fn further(truth: &RigTruth) -> String {
+    let mut text = String::new();
+    for triad in &truth.further {
+        let Some(relation) = triad.relation(&truth.unit) else {
+            continue;
+        };
+        let _ = writeln!(
+            text,
+            "# {}: x = C u + o in its own frame (x along its first axis, y in the plane of the first two), in {}, with C = {:?} and o = {:?}.\n\
+             # Rotation vector to the frame of the first accelerometer: {:?} deg. It is {:.4} ms later than {}, at {:?} mm.",
+            triad.name,
+            triad.kind.unit(),
+            relation.inverse.matrix,
+            relation.inverse.offset,
+            relation.rotation_deg,
+            relation.delay_ms,
+            triad.kind.reference(),
+            relation.lever_mm,
+        );
+    }
+    text
 }
 
 /// Carries out moves (of what, from, to) in order, all or none. Errors: what could not be moved.

@@ -12,6 +12,7 @@ use parquet::file::writer::SerializedFileWriter;
 use parquet::schema::types::{Type, TypePtr};
 
 use super::{Row, Run};
+use crate::body::FurtherTruth;
 use crate::plan::{CarriedBy, Plan};
 
 /// Columns before those of the table; if the dwells are numbered, `step` follows the first.
@@ -31,26 +32,35 @@ const REFERENCES: [&str; 6] = [
 const BLOCK: usize = 65_536;
 
 /// Columns of a plan's recording, without `step`.
-fn columns(plan: &Plan) -> impl Iterator<Item = &'static str> {
+fn columns(plan: &Plan, further: &[FurtherTruth]) -> Vec<String> {
     let references: &[_] = match plan.carrier {
         CarriedBy::Table => &REFERENCES,
         CarriedBy::Hands => &[],
     };
-    READINGS.into_iter().chain(references.iter().copied())
+    let first = READINGS.iter().chain(references);
+    let further = further
+        .iter()
+        .flat_map(|triad| ["x", "y", "z"].map(|axis| format!("{}_{axis}", triad.name)));
+    first
+        .map(|name| (*name).to_owned())
+        .chain(further)
+        .collect()
 }
 
-/// The values of [`columns`] in their order; by hand the last six are not used.
-fn values(row: &Row) -> [f64; 14] {
+/// The values of [`columns`] in their order; NaN is an empty cell.
+fn values(row: &Row) -> impl Iterator<Item = f64> {
     let Row {
         instant,
         stamp_s,
         readings,
+        further,
     } = row;
     let ([gx, gy, gz], [ax, ay, az]) = (readings.gyro, readings.accel);
-    let [wx, wy, wz] = instant.stated_rate.unwrap_or_default().map(f64::to_degrees);
-    let [fx, fy, fz] = instant.stated_force.unwrap_or_default();
-    let (t_s, temp_c) = (*stamp_s, readings.temp_c);
-    [t_s, temp_c, gx, gy, gz, ax, ay, az, wx, wy, wz, fx, fy, fz]
+    let first = [*stamp_s, readings.temp_c, gx, gy, gz, ax, ay, az];
+    let stated_dps = instant.stated_rate.map(|rate| rate.map(f64::to_degrees));
+    let references = stated_dps.into_iter().chain(instant.stated_force).flatten();
+    let further = further.iter().flatten().copied();
+    first.into_iter().chain(references).chain(further)
 }
 
 /// Number of the dwell, -1 between dwells.
@@ -59,19 +69,21 @@ fn step(row: &Row) -> i32 {
 }
 
 /// Writes a CSV file: every number with the fewest digits that lose no bit.
-pub(super) fn csv(path: &Path, plan: &Plan, run: Run) -> io::Result<()> {
+pub(super) fn csv(path: &Path, plan: &Plan, further: &[FurtherTruth], run: Run) -> io::Result<()> {
     let mut out = BufWriter::with_capacity(1 << 18, File::create(path)?);
-    let columns: Vec<_> = columns(plan).collect();
+    let columns = columns(plan, further);
     let step_title = if plan.numbered { ",step" } else { "" };
     writeln!(out, "{}{step_title},{}", columns[0], columns[1..].join(","))?;
     for row in run {
-        let values = values(&row);
-        write!(out, "{}", values[0])?;
-        if plan.numbered {
-            write!(out, ",{}", step(&row))?;
-        }
-        for value in &values[1..columns.len()] {
-            write!(out, ",{value}")?;
+        for (i, value) in values(&row).enumerate() {
+            match i {
+                0 => write!(out, "{value}")?,
+                _ if value.is_nan() => out.write_all(b",")?,
+                _ => write!(out, ",{value}")?,
+            }
+            if plan.numbered && i == 0 {
+                write!(out, ",{}", step(&row))?;
+            }
         }
         out.write_all(b"\n")?;
     }
@@ -79,8 +91,13 @@ pub(super) fn csv(path: &Path, plan: &Plan, run: Run) -> io::Result<()> {
 }
 
 /// Writes a Parquet file.
-pub(super) fn parquet(path: &Path, plan: &Plan, run: Run) -> io::Result<()> {
-    let columns: Vec<_> = columns(plan).collect();
+pub(super) fn parquet(
+    path: &Path,
+    plan: &Plan,
+    further: &[FurtherTruth],
+    run: Run,
+) -> io::Result<()> {
+    let columns = columns(plan, further);
     let mut fields: Vec<TypePtr> = Vec::new();
     for column in &columns {
         fields.push(field(column, Physical::DOUBLE)?);

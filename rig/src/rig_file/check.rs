@@ -1,6 +1,6 @@
 //! Checks of a rig file.
 
-use super::{AxesFile, FORMAT, Parts, RigFile};
+use super::{AffineFile, AxesFile, FORMAT, Parts, RigFile};
 use crate::catalog::{MeasuredQuantity, Sensor, sensor, sensors};
 use crate::converter::RawUnit;
 use crate::effects::specs;
@@ -21,7 +21,7 @@ const BANDWIDTH: [f64; 2] = [0.001, f64::INFINITY];
 const LAG: [f64; 2] = [0.01, 1e6];
 const HEATING: [f64; 2] = [0.0, 100.0];
 
-fn refuse(
+pub(super) fn refuse(
     path: impl Into<String>,
     problem: impl Into<String>,
     remedy: impl Into<String>,
@@ -39,8 +39,12 @@ impl RigFile {
                 format!("write \"{FORMAT}\""),
             );
         }
-        let gyro = self.sensors(MeasuredQuantity::Gyro)?;
-        let accel = self.sensors(MeasuredQuantity::Accel)?;
+        let gyro = parts("unit.gyro", MeasuredQuantity::Gyro, self.unit.gyro.as_ref())?;
+        let accel = parts(
+            "unit.accel",
+            MeasuredQuantity::Accel,
+            self.unit.accel.as_ref(),
+        )?;
         let unit = &self.unit;
         axes("unit.gyro_axes", &unit.gyro_axes, &gyro)?;
         axes("unit.accel_axes", &unit.accel_axes, &accel)?;
@@ -48,27 +52,9 @@ impl RigFile {
             ("gyro", &unit.gyro_affine, &unit.gyro_axes),
             ("accel", &unit.accel_affine, &unit.accel_axes),
         ] {
-            let Some(affine) = affine else { continue };
-            let path = format!("unit.{name}_affine.matrix");
-            within(&path, affine.matrix.as_flattened(), GAIN)?;
-            within(&format!("unit.{name}_affine.bias"), &affine.bias, RAW)?;
-            span(&path, &affine.matrix)?;
-            for (key, stated) in [
-                ("directions", axes.directions.is_some()),
-                (
-                    "sensitivity_raw_per_si",
-                    axes.sensitivity_raw_per_si.is_some(),
-                ),
-                ("null_raw", axes.null_raw.is_some()),
-            ] {
-                if stated {
-                    return refuse(
-                        format!("unit.{name}_axes.{key}"),
-                        format!("`{key}` is given twice: [unit.{name}_affine] has it too"),
-                        "remove one of them",
-                    );
-                }
-            }
+            let [affine_path, axes_path] =
+                ["affine", "axes"].map(|table| format!("unit.{name}_{table}"));
+            model(&affine_path, affine, &axes_path, axes)?;
         }
         self.check_numbers()?;
         self.curves.check()?;
@@ -76,6 +62,7 @@ impl RigFile {
         self.table.check()?;
         self.hands.check()?;
         self.flaws.check()?;
+        self.check_triads()?;
         let analog = [&gyro, &accel].map(|parts| parts[0].output == RawUnit::V);
         if self.converter.raw_unit == Some(RawUnit::V) && !(analog[0] && analog[1]) {
             return refuse(
@@ -191,45 +178,82 @@ impl RigFile {
         let pins = unit.gyro_reference_v.as_slice().as_flattened();
         within("unit.gyro_reference_v", pins, [0.1, 10.0])
     }
-
-    /// Catalog entries of the three axes, which must agree in the properties of the whole triad.
-    pub(super) fn sensors(&self, kind: MeasuredQuantity) -> Result<[&'static Sensor; 3], Refusal> {
-        let (path, parts, usual) = match kind {
-            MeasuredQuantity::Gyro => ("unit.gyro", &self.unit.gyro, "ADXRS300"),
-            MeasuredQuantity::Accel => ("unit.accel", &self.unit.accel, "MMA7260QT"),
-        };
-        let names = match parts {
-            None => [usual; 3],
-            Some(Parts::One(name)) => [name.as_str(); 3],
-            Some(Parts::Each(names)) => names.each_ref().map(String::as_str),
-        };
-        let found = names.map(|name| sensor(kind, name));
-        if let [Some(x), Some(y), Some(z)] = found {
-            for other in [y, z] {
-                let alike = |s: &Sensor| (s.output, s.packages, s.ratiometric);
-                if alike(x) != alike(other) {
-                    let problem = format!("{} and {} cannot be in one triad", x.name, other.name);
-                    let remedy = "choose parts with the same kind of output and package";
-                    refuse(path, problem, remedy)?;
-                }
-            }
-            return Ok([x, y, z]);
-        }
-        let unknown = names[found.iter().position(Option::is_none).unwrap_or(0)];
-        let known: Vec<_> = sensors()
-            .iter()
-            .filter(|s| s.kind == kind)
-            .map(|s| s.name.as_str())
-            .collect();
-        Err(Refusal {
-            path: path.to_owned(),
-            problem: format!("no sensor has the name \"{unknown}\""),
-            remedy: format!("known are: {}", known.join(", ")),
-        })
-    }
 }
 
-fn axes(path: &str, axes: &AxesFile, parts: &[&Sensor; 3]) -> Result<(), Refusal> {
+/// Catalog entries of the three axes of a triad, which must agree in the properties of the whole triad.
+pub(super) fn parts(
+    path: &str,
+    kind: MeasuredQuantity,
+    given: Option<&Parts>,
+) -> Result<[&'static Sensor; 3], Refusal> {
+    let names = match given {
+        None => match kind {
+            MeasuredQuantity::Gyro => ["ADXRS300"; 3],
+            MeasuredQuantity::Accel => ["MMA7260QT"; 3],
+            MeasuredQuantity::Mag => ["AK8963"; 3],
+        },
+        Some(Parts::One(name)) => [name.as_str(); 3],
+        Some(Parts::Each(names)) => names.each_ref().map(String::as_str),
+    };
+    let found = names.map(|name| sensor(kind, name));
+    if let [Some(x), Some(y), Some(z)] = found {
+        for other in [y, z] {
+            let alike = |s: &Sensor| (s.output, s.packages, s.ratiometric);
+            if alike(x) != alike(other) {
+                let problem = format!("{} and {} cannot be in one triad", x.name, other.name);
+                let remedy = "choose parts with the same kind of output and package";
+                refuse(path, problem, remedy)?;
+            }
+        }
+        return Ok([x, y, z]);
+    }
+    let unknown = names[found.iter().position(Option::is_none).unwrap_or(0)];
+    let known: Vec<_> = sensors()
+        .iter()
+        .filter(|s| s.kind == kind)
+        .map(|s| s.name.as_str())
+        .collect();
+    Err(Refusal {
+        path: path.to_owned(),
+        problem: format!("no sensor has the name \"{unknown}\""),
+        remedy: format!("known are: {}", known.join(", ")),
+    })
+}
+
+/// Checks the forward model of a triad, which may give what its axes would give, but not both.
+pub(super) fn model(
+    path: &str,
+    affine: &Option<AffineFile>,
+    axes_path: &str,
+    axes: &AxesFile,
+) -> Result<(), Refusal> {
+    let Some(affine) = affine else {
+        return Ok(());
+    };
+    let matrix = format!("{path}.matrix");
+    within(&matrix, affine.matrix.as_flattened(), GAIN)?;
+    within(&format!("{path}.bias"), &affine.bias, RAW)?;
+    span(&matrix, &affine.matrix)?;
+    for (key, stated) in [
+        ("directions", axes.directions.is_some()),
+        (
+            "sensitivity_raw_per_si",
+            axes.sensitivity_raw_per_si.is_some(),
+        ),
+        ("null_raw", axes.null_raw.is_some()),
+    ] {
+        if stated {
+            return refuse(
+                format!("{axes_path}.{key}"),
+                format!("`{key}` is given twice: [{path}] has it too"),
+                "remove one of them",
+            );
+        }
+    }
+    Ok(())
+}
+
+pub(super) fn axes(path: &str, axes: &AxesFile, parts: &[&Sensor; 3]) -> Result<(), Refusal> {
     let at = |key: &str| format!("{path}.{key}");
     if let Some(directions) = &axes.directions {
         within(&at("directions"), directions.as_flattened(), [-1e6, 1e6])?;

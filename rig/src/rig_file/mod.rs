@@ -10,12 +10,14 @@ mod curves;
 mod effect;
 mod lines;
 mod resolve;
+mod triad;
 
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
 use crate::converter::RawUnit;
+use crate::field::FieldTruth;
 use crate::flaws::FlawsTruth;
 use crate::hands::HandsTruth;
 use crate::history::History;
@@ -26,6 +28,7 @@ use crate::unit::TemperatureSensor;
 
 pub use curves::{AccelCurvesFile, CurvesFile, GyroCurvesFile};
 pub use resolve::RigTruth;
+pub use triad::TriadFile;
 
 /// Required value of the key `format`.
 pub const FORMAT: &str = "mimu-rig/1";
@@ -66,6 +69,12 @@ pub struct RigFile {
     /// Flaws of the recording.
     #[serde(default)]
     pub flaws: FlawsTruth,
+    /// The magnetic field, for magnetometers. The truth contains it if there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub field: Option<FieldTruth>,
+    /// Triads beyond the first gyro and accelerometer.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub triad: Vec<TriadFile>,
     /// Effects that the affine model lacks.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub effect: Vec<EffectFile>,
@@ -263,6 +272,8 @@ impl Default for RigFile {
             table: TableTruth::default(),
             hands: HandsTruth::default(),
             flaws: FlawsTruth::default(),
+            field: None,
+            triad: Vec::new(),
             effect: Vec::new(),
         }
     }

@@ -2,10 +2,13 @@
 
 use std::array::from_fn;
 
+use super::check::parts;
 use super::{AffineFile, AxesFile, ConverterFile, EffectFile, RigFile, UnitFile};
+use crate::body::FurtherTruth;
 use crate::catalog::{MeasuredQuantity, Sensor};
 use crate::converter::{ConverterTruth, RawUnit};
 use crate::effects::{EffectTruth, draw_ids};
+use crate::field::FieldTruth;
 use crate::flaws::FlawsTruth;
 use crate::hands::HandsTruth;
 use crate::noise::Coefficients;
@@ -34,6 +37,10 @@ pub struct RigTruth {
     pub hands: HandsTruth,
     /// Flaws of the recording.
     pub flaws: FlawsTruth,
+    /// The magnetic field.
+    pub field: FieldTruth,
+    /// Triads beyond the first gyro and accelerometer, in the order of their columns.
+    pub further: Vec<FurtherTruth>,
 }
 
 impl RigTruth {
@@ -43,8 +50,12 @@ impl RigTruth {
     pub fn resolve(file: &RigFile, seed: u64) -> Result<Self, String> {
         file.check()?;
         let mut file = file.clone();
-        let gyro = file.sensors(MeasuredQuantity::Gyro)?;
-        let accel = file.sensors(MeasuredQuantity::Accel)?;
+        let gyro = parts("unit.gyro", MeasuredQuantity::Gyro, file.unit.gyro.as_ref())?;
+        let accel = parts(
+            "unit.accel",
+            MeasuredQuantity::Accel,
+            file.unit.accel.as_ref(),
+        )?;
 
         let effects = effects(&mut file, seed)?;
         let earth_rate = *file.earth_rate.get_or_insert(true);
@@ -67,14 +78,19 @@ impl RigTruth {
         let converter_reference = converter_reference(&mut file.converter, seed);
         let nominal_v = converter_reference.nominal_v;
         let analog = gyro_truth.analog && accel_truth.analog;
-        let parts = [gyro[0], accel[0]];
-        let converter = converter(&mut file.converter, nominal_v, parts, analog);
+        let sensors = [gyro[0], accel[0]];
+        let converter = converter(&mut file.converter, nominal_v, sensors, analog);
         set_codes(&mut gyro_truth, nominal_v / converter.gyro_divider);
         set_codes(&mut accel_truth, nominal_v / converter.accel_divider);
 
+        let further = file.further(nominal_v / f64::from(converter.bits).exp2(), seed)?;
+        if further.iter().any(|f| f.kind == MeasuredQuantity::Mag) {
+            file.field.get_or_insert_default();
+        }
         let curves = file.curves.resolve(seed);
         let thermal = thermal(&mut file, [gyro[0], gyro[1], gyro[2], accel[0]], seed);
         let (table, hands, flaws) = (file.table.clone(), file.hands.clone(), file.flaws.clone());
+        let field = file.field.clone().unwrap_or_default();
         Ok(Self {
             file,
             earth_rate,
@@ -94,6 +110,8 @@ impl RigTruth {
             table,
             hands,
             flaws,
+            field,
+            further,
         })
     }
 }
@@ -240,7 +258,7 @@ fn thermal(file: &mut RigFile, parts: [&Sensor; 4], seed: u64) -> ThermalTruth {
 }
 
 /// Axes from the catalog, except for given values. Directions, sensitivities and nulls are those of the forward model, if there is one.
-fn triad(
+pub(super) fn triad(
     file: &mut AxesFile,
     affine: Option<&AffineFile>,
     parts: [&Sensor; 3],

@@ -63,6 +63,7 @@ fn motion(rate: [f64; 3], force: [f64; 3]) -> Motion {
     Motion {
         t_s: 0.0,
         attitude: Rotation::NONE,
+        position: [0.0; 3],
         rate,
         angular_acceleration: [0.0; 3],
         force,

@@ -2,6 +2,7 @@
 //!
 //! One binary, because linking one for each subject took longer than running it.
 
+mod body;
 mod curves;
 mod effects;
 mod extremes;

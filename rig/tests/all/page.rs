@@ -5,6 +5,7 @@ use std::fs;
 use std::path::Path;
 
 use mimu_rig::effects::{Draw, Shape, specs};
+use mimu_rig::field::FieldTruth;
 use mimu_rig::flaws::FlawsTruth;
 use mimu_rig::hands::HandsTruth;
 use mimu_rig::located::Source;
@@ -74,6 +75,9 @@ fn the_page_has_every_key_of_both_files_and_no_other() {
         ("`[table.settling]`", rig(&format!("[table.settling]\n{unknown}"))),
         ("`[hands]`", rig(&format!("[hands]\n{unknown}"))),
         ("`[flaws]`", rig(&format!("[flaws]\n{unknown}"))),
+        ("`[[triad]]`", rig(&format!("[[triad]]\n{unknown}"))),
+        ("`[field]`", rig(&format!("[field]\n{unknown}"))),
+        ("`[[field.magnet]]`", rig(&format!("[[field.magnet]]\n{unknown}"))),
     ];
     for (heading, complaint) in cases {
         let documented: BTreeSet<_> = rows(&page, heading).into_iter().flat_map(|r| r.0).collect();
@@ -82,15 +86,18 @@ fn the_page_has_every_key_of_both_files_and_no_other() {
 }
 
 #[test]
-fn the_defaults_of_table_hands_and_flaws_are_those_of_the_code() {
+fn the_defaults_of_table_hands_flaws_and_field_are_those_of_the_code() {
     let page = page();
     let settling = toml::Table::try_from(TableTruth::default().settling).unwrap();
+    let mut field = toml::Table::try_from(FieldTruth::default()).unwrap();
+    field.insert("magnet".into(), toml::Table::new().into());
     #[rustfmt::skip]
     let cases = [
         ("`[table]`", toml::Table::try_from(TableTruth::default()).unwrap()),
         ("`[table.settling]`", settling),
         ("`[hands]`", toml::Table::try_from(HandsTruth::default()).unwrap()),
         ("`[flaws]`", toml::Table::try_from(FlawsTruth::default()).unwrap()),
+        ("`[field]`", field),
     ];
     for (heading, defaults) in cases {
         for (keys, cells) in rows(&page, heading) {

@@ -26,6 +26,7 @@ fn truth(text: &str, seed: u64) -> RigTruth {
 const MOTION: Motion = Motion {
     t_s: 0.0,
     attitude: Rotation::NONE,
+    position: [0.0; 3],
     rate: [0.1; 3],
     angular_acceleration: [0.0; 3],
     force: [0.0, 0.0, 9.8],
@@ -44,6 +45,7 @@ fn the_truth_is_a_rig_file_in_which_nothing_is_left_to_draw() {
         xu,
         affine,
         "[[effect]]\nid = \"accel_size_effect\"\n",
+        "[[triad]]\nname = \"gyro2\"\n[[triad]]\nname = \"mag\"\nevery = 3\n",
     ] {
         let first = truth(text, 11);
         let written = first.file.to_toml();

@@ -2,6 +2,7 @@
 
 mod agreement;
 mod bias_removal;
+mod body;
 mod coverage;
 mod diagnosis;
 mod earth;

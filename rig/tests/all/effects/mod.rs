@@ -99,6 +99,7 @@ fn motion(t_s: f64, rate: [f64; 3], force: [f64; 3]) -> Motion {
     Motion {
         t_s,
         attitude: Rotation::NONE,
+        position: [0.0; 3],
         rate,
         angular_acceleration: [0.0; 3],
         force,

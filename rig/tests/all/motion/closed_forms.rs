@@ -65,7 +65,7 @@ fn a_pendulum_feels_gravity_and_its_swing_along_the_rod_and_nothing_across() {
             acceleration: -g / length * phi.sin(),
         };
         let body = Frame::ground(&place).about_own::<0>(angle);
-        let motion = body.motion(0.0, &place, [0.0, 0.0, -length], [0.0; 3], [0.0; 3]);
+        let motion = body.motion(0.0, &place, [0.0, 0.0, -length], [Jet::default(); 3]);
         let along = g * phi.cos() + length * rate * rate;
         assert_near(motion.force, [0.0, 0.0, along], 1e-12);
         // At the lowest point, by energy: g (3 - 2 cos φ0).

@@ -159,3 +159,47 @@ fn a_person_takes_faces_then_edges_then_corners_and_misses_each_by_degrees() {
     let effective = (misses.iter().map(|m| m * m).sum::<f64>() / 26.0).sqrt();
     assert!(effective > 2.5 && effective < 6.0, "{effective}");
 }
+
+#[test]
+fn a_tumble_goes_through_all_attitudes_without_a_rest_and_ends_where_it_began() {
+    let steps = "[[step]]\nup = [0, 0, 1]\ndwell_s = 2\n[[step]]\ntumble_s = 60\ndwell_s = 2";
+    let mut hands = hands(steps, &HandsTruth::default(), 8);
+    let (mut ups, mut rates, mut rest) = ([[1.0_f64, -1.0]; 3], Vec::new(), Vec::new());
+    let mut last = None;
+    for k in 0..(100.0 * hands.duration_s()) as usize {
+        let instant = hands.at(0.01 * k as f64);
+        let motion = instant.motion;
+        match instant.step {
+            Some(_) => rest.push(motion.attitude),
+            None if !rest.is_empty() => rates.push(norm(motion.rate).to_degrees()),
+            None => {}
+        }
+        for (axis, up) in motion
+            .attitude
+            .inverse()
+            .turn([0.0, 0.0, 1.0])
+            .into_iter()
+            .enumerate()
+        {
+            ups[axis] = [ups[axis][0].min(up), ups[axis][1].max(up)];
+        }
+        // The rate has no jump: less than 0.3 rad/s in 10 ms, of which the tremor makes a third.
+        if let Some(last) = last {
+            assert!(norm(minus(motion.rate, last)) < 0.3, "{k}");
+        }
+        last = Some(motion.rate);
+    }
+    assert!(
+        ups.iter().all(|[low, high]| *low < -0.8 && *high > 0.8),
+        "{ups:?}"
+    );
+    // The longest run of samples slower than 5 deg/s in the minute, but for the pauses before and after.
+    let minute = &rates[150..rates.len() - 450];
+    let slow = minute.chunk_by(|a, b| (*a < 5.0) == (*b < 5.0));
+    let longest = slow.filter(|run| run[0] < 5.0).map(<[f64]>::len).max();
+    assert!(longest.unwrap_or(0) < 100, "{longest:?}");
+    let mean = minute.iter().sum::<f64>() / minute.len() as f64;
+    assert!((20.0..200.0).contains(&mean), "{mean}");
+    let (_, apart) = (rest[0].inverse() * rest[rest.len() - 1]).axis_angle();
+    assert!(apart.to_degrees() < 3.0, "{apart}");
+}

@@ -95,4 +95,26 @@ fn mistakes_in_a_step_are_named_with_their_line() {
             "{error}"
         );
     }
+    let tumble = "tumble_s = 60\ndwell_s = 1";
+    assert_complaint(
+        &format!("{HEAD}[[step]]\n{tumble}\n"),
+        ("PLAN.toml:5: `tumble_s` on a table", "hands"),
+    );
+    let head = HEAD.replace("table", "hands");
+    for (step, complaint) in [
+        (
+            format!("up = [0, 0, 1]\n{tumble}"),
+            ("PLAN.toml:6: `tumble_s` beside a pose", "separate"),
+        ),
+        (
+            tumble.to_owned(),
+            ("PLAN.toml:4: the first entry has no pose", "add `up`"),
+        ),
+        (
+            "tumble_s = 0.5\ndwell_s = 1".to_owned(),
+            ("PLAN.toml:5: `tumble_s` is 0.5", "1 to 3600 s"),
+        ),
+    ] {
+        assert_complaint(&format!("{head}[[step]]\n{step}\n"), complaint);
+    }
 }

@@ -1,0 +1,63 @@
+//! Bodies of several triads by hand: intervals that hold the truth, and fields that are disturbed.
+
+use mimu_recording::{TriadKind, TriadName};
+use mimu_tests::body::{Bandwidth, Disturbance, Found, cases, table, tallies};
+
+/// Intervals of the further triads of undisturbed bodies.
+fn undisturbed(bodies: u64, bandwidth: Bandwidth) -> Vec<Vec<Found>> {
+    let bodies = cases(Disturbance::None, bandwidth, bodies);
+    let shown = table(&bodies);
+    println!("{} bodies, {bandwidth:?}\n{shown}", bodies.len());
+    for ((name, kind), tally) in tallies(&bodies) {
+        // The parameters of one kind in a body share errors: four sigmas of a third of their number.
+        let margin = 4.0 * (0.93 * 0.07 * 3.0 / f64::from(tally.count)).sqrt();
+        assert!(
+            tally.share() > 0.93 - margin,
+            "{name}, {kind}: {tally:?}\n{shown}"
+        );
+    }
+    bodies
+}
+
+/// Number of magnetometers that a user takes for good, of bodies in a disturbed field.
+fn good(disturbance: Disturbance, bodies: u64) -> usize {
+    let mag = TriadName::first(TriadKind::Mag);
+    // White noise: nothing but the field is then a reason to doubt it.
+    let bodies = cases(disturbance, Bandwidth::Unlimited, bodies);
+    let all = bodies.iter().flatten();
+    let good = all.filter(|f| f.name == mag && f.is_good()).count();
+    let count = bodies.len();
+    println!("{disturbance:?}: {good} of {count} magnetometers are good");
+    good
+}
+
+#[test]
+fn the_further_triads_of_a_body_are_good_and_their_intervals_hold_the_truth() {
+    for found in undisturbed(8, Bandwidth::Unlimited).iter().flatten() {
+        assert!(found.is_good(), "{found:?}");
+    }
+}
+
+#[test]
+fn a_magnetometer_in_a_strongly_disturbed_field_is_not_good() {
+    assert_eq!(good(Disturbance::Desk(40.0), 4), 0);
+    assert_eq!(good(Disturbance::Phone(40.0), 4), 0);
+}
+
+#[test]
+#[ignore = "nightly: more bodies"]
+fn intervals_of_many_further_triads_hold_the_truth() {
+    undisturbed(200, Bandwidth::OfParts);
+}
+
+#[test]
+#[ignore = "nightly: more bodies"]
+fn magnetometers_in_disturbed_fields_are_not_good() {
+    for size_ut in [5.0, 10.0, 20.0, 40.0] {
+        for disturbance in [Disturbance::Desk(size_ut), Disturbance::Phone(size_ut)] {
+            let good = good(disturbance, 24);
+            // What changes the field by less may stay below what the noise shows.
+            assert!(good == 0 || size_ut < 40.0, "{disturbance:?}: {good}");
+        }
+    }
+}
