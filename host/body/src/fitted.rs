@@ -70,7 +70,8 @@ fn apart(of: &Affine<f64>) -> Option<(Affine<f64>, Rotation3<f64>)> {
     }
     let back = q.transpose();
     let own = Affine {
-        matrix: back * of.matrix,
+        // Above its diagonal there is nothing but rounding.
+        matrix: (back * of.matrix).lower_triangle(),
         offset: back * of.offset,
     };
     Some((own, Rotation3::from_matrix_unchecked(q)))

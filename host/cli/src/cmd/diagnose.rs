@@ -13,7 +13,7 @@ use mimu::plan::next_experiment;
 use mimu::prepared::Prepared;
 use mimu::recording_problem::OfRecording;
 use mimu::signal::stillness::DwellSearch;
-use mimu_body::split_turns;
+use mimu_body::{Body, Options, split_turns};
 use mimu_recording::error::Result;
 
 use crate::arguments::{
@@ -92,6 +92,34 @@ impl DiagnoseArgs {
 const MISFIT: &str =
     "check range, columns and unit of the readings and record again, or write it all the same";
 
+/// Writes the plan of the next experiment, if it is asked for.
+fn write_plan(args: &DiagnoseArgs, done: &Diagnosed, out: &mut Results) -> Result<()> {
+    let Diagnosed {
+        diagnosis,
+        next,
+        result: found,
+        ..
+    } = done;
+    if args.plan.is_none() {
+        return Ok(());
+    }
+    const PLAN: &str = "plan of the next experiment";
+    match next_experiment::together(diagnosis, next) {
+        Some((setup, answer)) => {
+            let manifest = &diagnosis.before.prepared.manifest;
+            let left_out = report::not_in_plan_text(found);
+            let about: String = left_out.lines().map(|l| format!("# {l}\n")).collect();
+            let plan = answer.plan(&setup, Some(&manifest.device), manifest.sample_rate_hz);
+            out.file(PLAN, args.plan.as_ref(), || Ok(about + &plan))?;
+            out.say(&left_out);
+        }
+        None => out.say(&format!(
+            "\n{PLAN}: none written, because no plan of this kind would show or distinguish more\n"
+        )),
+    }
+    Ok(())
+}
+
 pub fn run(args: &DiagnoseArgs, command_line: &str) -> Result<Status> {
     let outputs = [
         args.output.as_deref(),
@@ -135,7 +163,6 @@ pub fn run(args: &DiagnoseArgs, command_line: &str) -> Result<Status> {
     let done = done.inspect_err(|_| refused(&problems, several))?;
     let Diagnosed {
         diagnosis,
-        next,
         result: found,
         ..
     } = &done;
@@ -144,8 +171,13 @@ pub fn run(args: &DiagnoseArgs, command_line: &str) -> Result<Status> {
         next: args.next,
     };
     let first = samples.take().into_iter().next();
-    let split = first.map(|first| split_turns(&first, &diagnosis.before, args.still.search()));
+    let before = &diagnosis.before;
+    let split = first
+        .as_ref()
+        .map(|of| split_turns(of, before, args.still.search()));
     let split = split.transpose()?.flatten();
+    let body = first.map(|first| Body::of(&first, before, &Options::default()));
+    let body = body.transpose()?.flatten();
     let mut out = Results::new(report::diagnosis_text(found, detail));
     if let Some(split) = &split {
         out.say(&report::split_text(split));
@@ -153,24 +185,12 @@ pub fn run(args: &DiagnoseArgs, command_line: &str) -> Result<Status> {
     let place = diagnosis.before.prepared.place.clone();
     let refusal = args.writing.refusal(&found.judgement, &place, MISFIT);
     let output = args.output.as_ref().filter(|_| refusal.is_none());
-    if args.plan.is_some() {
-        const PLAN: &str = "plan of the next experiment";
-        match next_experiment::together(diagnosis, next) {
-            Some((setup, answer)) => {
-                let manifest = &diagnosis.before.prepared.manifest;
-                let left_out = report::not_in_plan_text(found);
-                let about: String = left_out.lines().map(|l| format!("# {l}\n")).collect();
-                let plan = answer.plan(&setup, Some(&manifest.device), manifest.sample_rate_hz);
-                out.file(PLAN, args.plan.as_ref(), || Ok(about + &plan))?;
-                out.say(&left_out);
-            }
-            None => out.say(&format!(
-                "\n{PLAN}: none written, because no plan of this kind would show or distinguish more\n"
-            )),
-        }
-    }
+    write_plan(args, &done, &mut out)?;
     out.file("calibration", output, || {
-        Ok(done.calibration(&now)?.to_toml())
+        let mut made = done.calibration(&now)?;
+        let raw = before.prepared.manifest.raw_unit;
+        made.body = body.iter().flat_map(|body| body.tables(raw)).collect();
+        Ok(made.to_toml())
     })?;
     out.file("page", args.page.as_ref(), || {
         let made = Made::of(&args.recordings, command_line);
