@@ -4,6 +4,7 @@ mod accept;
 mod allan_command;
 mod bad_input;
 mod biases_at_rest;
+mod body_command;
 mod certificate;
 mod command;
 mod design_command;
