@@ -299,11 +299,17 @@ fn body_alone(
 ) -> Result<Status> {
     let body = samples.map(|samples| Body::of_readings(samples, prepared, &args.body()));
     let body = body.transpose()?.flatten();
+    let raw = prepared.manifest.raw_unit;
+    for (triad, judgement) in body.iter().flat_map(|body| &body.refused) {
+        eprintln!(
+            "{triad} beside readings in SI is not calibrated: {}",
+            judgement.reason
+        );
+    }
     let Some(body) = body.filter(|body| !body.triads.is_empty()) else {
         Refused::of(prepared).print();
         return Err(why);
     };
-    let raw = prepared.manifest.raw_unit;
     let (more, judgement) = (BodyResult::of(&body, raw), body.judgement());
     let text = format!(
         "{}: gyro and accelerometer are taken as they read: {why}\n{}",
