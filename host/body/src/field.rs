@@ -55,6 +55,8 @@ pub(crate) struct Field {
     pub rests: usize,
     /// Errors of an axis after a turn, in the unit of the field.
     pub errors: Errors,
+    /// Rms error of its size, in the same unit: what differs by place changes little during a turn, and shows here.
+    pub size_rms: f64,
     pub left_out: Vec<[f64; 2]>,
     /// Share of the pieces of time that is left out.
     pub left_out_share: f64,
@@ -99,13 +101,14 @@ impl Field {
         problem.field(&at, &solution?, &mut groups, &used)
     }
 
-    /// Errors of a magnetometer that stands so, and the size of the field: `size`, or else the mean that it reads. `None` if nothing turns.
+    /// Errors of a magnetometer that stands so; the rms error of the size of the field, and that size: `size`, or else the mean that it reads. `None` if nothing
+    /// turns.
     pub fn errors(
         raw: Series,
         motion: &Motion,
         standing: &Standing,
         size: Option<f64>,
-    ) -> Option<(Errors, f64)> {
+    ) -> Option<(Errors, [f64; 2])> {
         let raw = raw.without_repeats();
         let sizes = raw.x.iter().map(|u| standing.calibration.apply(u).norm());
         let size = size.unwrap_or(sizes.sum::<f64>() / raw.len() as f64);
@@ -115,9 +118,11 @@ impl Field {
         at.fixed_rows_mut::<12>(0)
             .copy_from(&vector(&matrix, &offset));
         at[DELAY] = standing.delay_s;
+        let all = vec![true; problem.pieces.count];
+        let errors = problem.errors(&at, &all)?;
         Some((
-            problem.errors(&at, &vec![true; problem.pieces.count])?,
-            size,
+            errors,
+            [problem.size_rms(&standing.calibration, &all), size],
         ))
     }
 
@@ -348,6 +353,15 @@ impl<'a> Problem<'a> {
         Errors::of(&squares, 2.0 * per_axis)
     }
 
+    fn size_rms(&self, calibration: &Affine<f64>, used: &[bool]) -> f64 {
+        let own = self
+            .used
+            .iter()
+            .filter(|k| used[self.pieces.of(self.raw.t[**k])]);
+        let errors = own.map(|k| calibration.apply(&self.raw.x[*k]).norm() - self.size);
+        mimu_recording::statistics::root_mean_square(errors)
+    }
+
     fn field(
         &self,
         at: &DVector<f64>,
@@ -380,6 +394,7 @@ impl<'a> Problem<'a> {
             delay_undetermined: solution.by_weights[(DELAY, DELAY)].sqrt() / DELAY_S,
             rests: self.rests.len(),
             errors,
+            size_rms: self.size_rms(&calibration, used),
             left_out: self.pieces.spans(used),
             left_out_share: left as f64 / used.len() as f64,
             halves_rad,

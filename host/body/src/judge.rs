@@ -105,7 +105,7 @@ pub(crate) fn field(field: &Field, size: f64) -> Judgement {
             100.0 * field.left_out_share
         ));
     }
-    let again = field_again(&field.errors, size);
+    let again = field_again(&field.errors, field.size_rms, size);
     if field.halves_rad > MISFIT_RAD && again.needs_consent().is_none() {
         return misfit(format!(
             "the two halves of the recording give fields that differ by {} deg (rms): the field has changed, or each half turns too little; {MOVE_AWAY}",
@@ -115,8 +115,8 @@ pub(crate) fn field(field: &Field, size: f64) -> Judgement {
     again
 }
 
-/// Of a magnetometer by its errors after turns.
-pub(crate) fn field_again(errors: &Errors, size: f64) -> Judgement {
+/// Of a magnetometer by its errors after turns, and by the rms error of the size of the field.
+pub(crate) fn field_again(errors: &Errors, size_rms: f64, size: f64) -> Judgement {
     let [held, floor] = [errors.held_out_rms, errors.noise_floor].map(|x| x / size);
     let degrees = |x: f64| significant(x.to_degrees());
     if held > MISFIT_RAD {
@@ -124,6 +124,22 @@ pub(crate) fn field_again(errors: &Errors, size: f64) -> Judgement {
             "after a turn the field is off by {} deg (rms of an axis): {MOVE_AWAY}",
             degrees(held)
         ));
+    }
+    // After a turn two readings err.
+    let [varies, noise] = [size_rms / size, floor / 2f64.sqrt()];
+    if varies > MISFIT_RAD {
+        return misfit(format!(
+            "the size of the field varies by {:.1} %: {MOVE_AWAY}",
+            100.0 * varies
+        ));
+    }
+    if varies > BY_NOISE * noise {
+        let reason = format!(
+            "the size of the field varies by {:.1} %, and noise explains {:.1} %: it differs by place",
+            100.0 * varies,
+            100.0 * noise
+        );
+        return Judgement::new(JudgementKind::Unexplained, reason);
     }
     if held > BY_NOISE * floor {
         let reason = format!(

@@ -107,10 +107,11 @@ fn one(
                 "field" => Some(1.0),
                 _ => None,
             };
-            let Some((errors, size)) = Field::errors(raw, motion, &standing, size) else {
+            let Some((errors, [size_rms, size])) = Field::errors(raw, motion, &standing, size)
+            else {
                 return Ok(None);
             };
-            let judgement = judge::field_again(&errors, size);
+            let judgement = judge::field_again(&errors, size_rms, size);
             (errors, judgement)
         }
         kind => {
