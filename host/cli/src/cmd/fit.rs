@@ -11,6 +11,7 @@ use mimu::judgement::Judgement;
 use mimu::noise::noise_file::NoiseFile;
 use mimu::prepared::Prepared;
 use mimu::prior::Prior;
+use mimu::quantity::Sensor;
 use mimu::recording_problem::OfRecording;
 use mimu::result::fit::{DwellResult, FitResult};
 use mimu::result::sessions::SessionsResult;
@@ -380,15 +381,20 @@ fn one(args: &FitArgs, recording: &Path) -> Result<Status> {
 
 /// One calibration of several sessions.
 fn several(args: &FitArgs) -> Result<Status> {
-    let fits: Result<Vec<Fit>> = args
-        .recordings
-        .iter()
-        .map(|recording| fitted(args, prepared(args, recording)?.0, fit_determined))
-        .collect();
+    let mut further = false;
+    let mut one = |recording: &PathBuf| {
+        let (prepared, samples) = prepared(args, recording)?;
+        further |= samples.is_some_and(|of| of.triads().len() > Sensor::BOTH.len());
+        fitted(args, prepared, fit_determined)
+    };
+    let fits: Result<Vec<Fit>> = args.recordings.iter().map(&mut one).collect();
     let sessions = Sessions::combine(fits?, args.class())?;
     let combined = Calibration::of_sessions(&sessions, &now())?;
     let result = SessionsResult::of(&sessions, &combined);
     let mut text = report::sessions_text(&result, args.verbose.verbose);
+    if further {
+        text += "\nthe further triads of the recordings are left out: fit one recording to calibrate them\n";
+    }
     if args.dwells {
         for fit in &sessions.fits {
             let dwells = DwellResult::list(&fit.prepared);
