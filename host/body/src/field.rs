@@ -11,10 +11,10 @@ use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, Vector3};
 
 use crate::carrier::Rest;
 use crate::clustered::{Clusters, Solution};
-use crate::judge::Errors;
+use crate::errors::Errors;
 use crate::pieces::{Groups, Pieces};
 use crate::series::{Motion, Series};
-use crate::verify::Standing;
+use crate::standing::Standing;
 
 /// Time between two readings that are compared, s: long enough to turn far, and short enough that a gyro's bias of 0.1 deg/s is a tenth of a degree.
 pub(crate) const TURN_S: f64 = 1.0;

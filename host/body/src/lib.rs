@@ -6,6 +6,7 @@
 
 mod carrier;
 mod clustered;
+mod errors;
 mod field;
 mod fitted;
 mod judge;
@@ -14,6 +15,7 @@ pub mod result;
 mod same_body;
 mod series;
 pub mod split;
+mod standing;
 mod verify;
 
 use mimu::fit::Fit;

@@ -11,10 +11,10 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use crate::carrier::Reference;
 use crate::clustered::{Clusters, Solution};
-use crate::judge::Errors;
+use crate::errors::Errors;
 use crate::pieces::{Groups, Pieces};
 use crate::series::Series;
-use crate::verify::Standing;
+use crate::standing::Standing;
 
 /// Length of a window, s. Longer ones average out what a hand does in less; shorter ones cost time and gain nothing.
 pub(crate) const WINDOW_S: f64 = 0.2;

@@ -9,13 +9,13 @@ use mimu::quantity::{PerSensor, Sensor};
 use mimu_core::compensation::Affine;
 use mimu_recording::error::Result;
 use mimu_recording::{RawUnit, Recording, TriadKind};
-use nalgebra::{Matrix3, Rotation3, Vector3};
 use serde::Serialize;
 
 use crate::carrier::{Carrier, read};
 use crate::field::Field;
 use crate::judge;
 use crate::same_body::Relation;
+use crate::standing::Standing;
 
 /// Errors of a further triad.
 #[derive(Debug, Clone, Serialize)]
@@ -30,31 +30,6 @@ pub struct TriadVerification {
     pub windows: usize,
     /// Its judgement.
     pub judgement: Judgement,
-}
-
-/// Where a triad stands, and its calibration in the frame of the reference.
-pub(crate) struct Standing {
-    /// C and o, in the frame of the reference.
-    pub calibration: Affine<f64>,
-    /// Delay, s, and arm, m; zero if they are not known.
-    pub delay_s: f64,
-    pub arm_m: Vector3<f64>,
-}
-
-impl From<&BodyTriad> for Standing {
-    fn from(of: &BodyTriad) -> Self {
-        let turned = of.rotation_deg.unwrap_or([0.0; 3]).map(f64::to_radians);
-        let rotation = Rotation3::new(Vector3::from(turned));
-        let own = Matrix3::from_fn(|i, j| of.C[i][j]);
-        Self {
-            calibration: Affine {
-                matrix: rotation * own,
-                offset: rotation * Vector3::from(of.o),
-            },
-            delay_s: of.delay_ms.unwrap_or(0.0) / 1e3,
-            arm_m: Vector3::from(of.lever_arm_mm.unwrap_or([0.0; 3])) / 1e3,
-        }
-    }
 }
 
 /// Errors of the further triads that both the file and the recording have, by name.
