@@ -1,7 +1,6 @@
 //! The first gyro and accelerometer of a body, compensated: what its further triads are compared with.
 
 use mimu::fit::Fit;
-use mimu::prepared::Prepared;
 use mimu::quantity::{PerSensor, Sensor};
 use mimu::signal::dwell::Dwell;
 use mimu::triad::{Covariance, Part, Triad};
@@ -68,9 +67,15 @@ pub(crate) fn read(recording: &Recording, name: TriadName) -> Result<Series> {
 pub(crate) struct Unit {
     /// Calibrations with their uncertainty.
     pub triads: PerSensor<Option<Triad>>,
+    /// Standard deviation of what remains of the gyro's bias, rad/s.
+    pub rate_bias: f64,
     /// Its rests.
     pub rests: Vec<Rest>,
 }
+
+/// How a gyro's bias wanders within a session, standard deviation, rad/s: 0.02 deg/s; and what it may be where it is not calibrated: 1 deg/s.
+const WANDER: f64 = 3.5e-4;
+const UNKNOWN: f64 = 0.017;
 
 /// How wrong a unit's readings in SI may be, standard deviations: of each element of C, and of o, rad/s and m/s². These are a percent, half a degree, and a bias at
 /// rest.
@@ -87,20 +92,16 @@ impl Unit {
             let found = fit.sensor(sensor)?;
             Some(found.estimated.triad.clone())
         });
-        Self::of(&fit.prepared, triads)
+        Self::of(&fit.prepared.dwells.list, triads, WANDER)
     }
 
-    /// As it reads, in SI, less what the gyro reads at rest.
-    pub fn nominal(prepared: &Prepared) -> Self {
+    /// As it reads, in SI, less what the gyro reads in these dwells.
+    pub fn nominal(dwells: &[Dwell], has: PerSensor<bool>) -> Self {
         let triads = PerSensor::from_fn(|sensor| {
-            prepared.has(sensor).then_some(())?;
+            has[sensor].then_some(())?;
             let mut at_rest = Vector3::zeros();
             if sensor == Sensor::Gyro {
-                let means = prepared
-                    .dwells
-                    .list
-                    .iter()
-                    .filter(|d| !d.spins() && !d.turn);
+                let means = dwells.iter().filter(|d| !d.spins() && !d.turn);
                 let means: Vec<_> = means.map(|d| d.raw_mean(sensor)).collect();
                 let sum: Vector3<f64> = means.iter().sum();
                 at_rest = sum / means.len().max(1) as f64;
@@ -116,12 +117,13 @@ impl Unit {
             };
             Triad::from_inverse(inverse, vec![part])
         });
-        Self::of(prepared, triads)
+        // A slow turn passes for a rest where there is none.
+        Self::of(dwells, triads, UNKNOWN)
     }
 
-    fn of(prepared: &Prepared, triads: PerSensor<Option<Triad>>) -> Self {
-        let dwells = prepared.dwells.list.iter();
-        let own = dwells.filter(|d| d.faults.accel.is_none() && !d.spins() && !d.turn);
+    fn of(dwells: &[Dwell], triads: PerSensor<Option<Triad>>, rate_bias: f64) -> Self {
+        let own = dwells.iter();
+        let own = own.filter(|d| d.faults.accel.is_none() && !d.spins() && !d.turn);
         let rest = |d: &Dwell| {
             let model = triads.accel.as_ref()?.inverse;
             Some(Rest {
@@ -131,6 +133,7 @@ impl Unit {
             })
         };
         Self {
+            rate_bias,
             rests: own.filter_map(rest).collect(),
             triads,
         }

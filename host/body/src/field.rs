@@ -30,10 +30,11 @@ const STEPS: usize = 30;
 const SETTLED_S: f64 = 1e-6;
 const LONGEST_STEP_S: f64 = 0.05;
 
-/// Parameters: C by rows, o, delay (s), sine of the dip.
+/// Parameters: C by rows, o, delay (s), sine of the dip, and what remains of the gyro's bias (rad/s).
 const DELAY: usize = 12;
 const DIP: usize = 13;
-const COUNT: usize = 14;
+const BIAS: usize = 14;
+const COUNT: usize = 17;
 /// Groups of residuals.
 const TURNS: usize = 0;
 const SIZES: usize = 1;
@@ -77,14 +78,17 @@ struct Problem<'a> {
     rests: Vec<(Vector3<f64>, Vector3<f64>, f64)>,
     pieces: Pieces,
     size: f64,
+    /// Standard deviation of what remains of the gyro's bias, rad/s.
+    bias: f64,
     /// Variance of a raw reading by white noise.
     noise: f64,
 }
 
 impl Field {
-    /// Of raw readings. `size`: that of the field, in the unit of the result. `None` if too little of it turns.
-    pub fn of(raw: Series, motion: &Motion, rests: &[Rest], size: f64) -> Option<Self> {
-        let problem = Problem::new(raw, motion, rests, size)?;
+    /// Of raw readings. `size`: that of the field, in the unit of the result; `bias`: standard deviation of what remains of the gyro's, rad/s. `None` if too
+    /// little of it turns.
+    pub fn of(raw: Series, motion: &Motion, rests: &[Rest], size: f64, bias: f64) -> Option<Self> {
+        let problem = Problem::new(raw, motion, rests, size, bias)?;
         let mut at = problem.start()?;
         let mut groups = Groups::default();
         let mut used = vec![true; problem.pieces.count];
@@ -112,7 +116,7 @@ impl Field {
         let raw = raw.without_repeats();
         let sizes = raw.x.iter().map(|u| standing.calibration.apply(u).norm());
         let size = size.unwrap_or(sizes.sum::<f64>() / raw.len() as f64);
-        let problem = Problem::new(raw, motion, &[], size)?;
+        let problem = Problem::new(raw, motion, &[], size, 1e-9)?;
         let mut at = DVector::zeros(COUNT);
         let Affine { matrix, offset } = standing.calibration;
         at.fixed_rows_mut::<12>(0)
@@ -149,7 +153,7 @@ fn by_calibration(u: &Vector3<f64>) -> SMatrix<f64, 3, 12> {
 }
 
 impl<'a> Problem<'a> {
-    fn new(raw: Series, motion: &'a Motion, rests: &[Rest], size: f64) -> Option<Self> {
+    fn new(raw: Series, motion: &'a Motion, rests: &[Rest], size: f64, bias: f64) -> Option<Self> {
         let pieces = Pieces::over(&raw.t)?;
         let mut used: Vec<usize> = Vec::new();
         for (k, t) in raw.t.iter().enumerate() {
@@ -179,6 +183,7 @@ impl<'a> Problem<'a> {
         Some(Self {
             rests: rests.iter().filter_map(mean).collect(),
             noise: raw.noise(),
+            bias,
             motion,
             used,
             pairs,
@@ -248,7 +253,9 @@ impl<'a> Problem<'a> {
                 .turn(self.raw.t[from] - delay, self.raw.t[to] - delay)?;
             Some(*turn.to_rotation_matrix().matrix())
         };
-        let turn: Matrix3<f64> = between(at[DELAY])?;
+        let [t0, t1] = [from, to].map(|k| self.raw.t[k] - at[DELAY]);
+        let whole = self.motion.turn(t0, t1)?;
+        let turn: Matrix3<f64> = *whole.to_rotation_matrix().matrix();
         let later = between(at[DELAY] + DELAY_STEP_S)? - between(at[DELAY] - DELAY_STEP_S)?;
         let [x0, x1] = [from, to].map(|k| calibration.apply(&self.raw.x[k]));
         let mut by = DMatrix::zeros(3, COUNT);
@@ -256,7 +263,13 @@ impl<'a> Problem<'a> {
         by.fixed_view_mut::<3, 12>(0, 0).copy_from(&by_own);
         by.column_mut(DELAY)
             .copy_from(&(-(later * x0) / (2.0 * DELAY_STEP_S)));
-        Some((turn * x0 - x1, by))
+        // A rate that reads more has turned the field back too far: by the bias, as seen from the middle of the turn.
+        let seen = turn * x0;
+        let middle: Matrix3<f64> = *whole.powf(0.5).to_rotation_matrix().matrix();
+        let by_bias = (t1 - t0) * seen.cross_matrix() * middle;
+        by.fixed_view_mut::<3, 3>(0, BIAS).copy_from(&by_bias);
+        let bias = at.fixed_rows::<3>(BIAS).into_owned();
+        Some((seen - by_bias * bias - x1, by))
     }
 
     fn settle(
@@ -289,6 +302,7 @@ impl<'a> Problem<'a> {
         let mut known = DVector::repeat(COUNT, f64::INFINITY);
         known[DELAY] = DELAY_S;
         known[DIP] = 1.0;
+        known.fixed_rows_mut::<3>(BIAS).fill(self.bias);
         let mut clusters = Clusters::new(self.pieces.count, at, &DVector::zeros(COUNT), &known);
         let calibration = affine(&at.fixed_rows::<12>(0).into_owned());
         groups.begin();

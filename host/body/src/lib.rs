@@ -22,10 +22,11 @@ use mimu::fit::Fit;
 use mimu::judgement::Judgement;
 use mimu::prepared::Prepared;
 use mimu::quantity::{PerSensor, Sensor};
+use mimu::signal::dwell::Dwell;
 use mimu::signal::stillness::DwellSearch;
 use mimu::triad::{Estimate, half_width_95};
 use mimu_recording::error::{Error, Result};
-use mimu_recording::{Recording, TriadKind, TriadName};
+use mimu_recording::{RawUnit, Recording, TriadKind, TriadName};
 use nalgebra::Rotation3;
 
 pub use fitted::{FittedTriad, Known};
@@ -68,18 +69,20 @@ impl Body {
         Self::fitted(recording, &Unit::fitted(unit), options)
     }
 
-    /// As [`Self::of`], with a gyro and an accelerometer that are taken as they read: in SI, less what the gyro reads at rest. Their errors, of a percent and half a
-    /// degree, are in the intervals.
+    /// As [`Self::of`], with a gyro and an accelerometer that are taken as they read: in SI, less what the gyro reads in these dwells. Their errors, of a percent and half
+    /// a degree, are in the intervals. Without a dwell the gyro's bias is found with the magnetometer. `None` too if the readings are not in SI.
     ///
     /// # Errors
     /// As of [`Self::of`].
     pub fn of_readings(
         recording: &Recording,
-        prepared: &Prepared,
+        dwells: &[Dwell],
         options: &Options,
     ) -> Result<Option<Self>> {
-        match prepared.is_in_si() {
-            true => Self::fitted(recording, &Unit::nominal(prepared), options),
+        let triads = recording.triads();
+        let has = PerSensor::from_fn(|sensor| triads.contains(&carrier::first(sensor)));
+        match recording.manifest.raw_unit == RawUnit::Si {
+            true => Self::fitted(recording, &Unit::nominal(dwells, has), options),
             false => Ok(None),
         }
     }
@@ -293,7 +296,7 @@ impl Fitting<'_> {
         };
         let size = options.field_ut.unwrap_or(1.0);
         let raw = raw.without_repeats();
-        let field = Field::of(raw, motion, &self.unit.rests, size).ok_or_else(|| {
+        let field = Field::of(raw, motion, &self.unit.rests, size, self.unit.rate_bias).ok_or_else(|| {
             judge::undetermined("the field turns too little in its readings: bring each axis to point each way, and turn about all three")
         })?;
         judge::determines(&field)?;

@@ -17,6 +17,7 @@ use mimu::result::fit::{DwellResult, FitResult};
 use mimu::result::sessions::SessionsResult;
 use mimu::sessions::class::PartClass;
 use mimu::sessions::{Sessions, fit_determined};
+use mimu::signal::dwell::Dwell;
 use mimu::signal::stillness::DwellSearch;
 use mimu_body::result::BodyResult;
 use mimu_body::{Body, Options as BodyOptions};
@@ -30,7 +31,7 @@ use crate::arguments::{
 };
 use crate::hint::OF_A_LOG;
 use crate::output::{Results, now};
-use crate::reading::{LogArgs, read_with_samples};
+use crate::reading::{LogArgs, open, read_with_samples};
 use crate::report;
 use crate::report::budget::budget_text;
 use crate::report::data_sheet::{WithDataSheet, data_sheet_text};
@@ -295,47 +296,55 @@ impl Refused {
 fn body_alone(
     args: &FitArgs,
     samples: Option<&Recording>,
-    prepared: &Prepared,
+    dwells: &[Dwell],
     why: Error,
 ) -> Result<Status> {
-    let body = samples.map(|samples| Body::of_readings(samples, prepared, &args.body()));
+    let body = samples.map(|samples| Body::of_readings(samples, dwells, &args.body()));
     let body = body.transpose()?.flatten();
-    let raw = prepared.manifest.raw_unit;
     for (triad, judgement) in body.iter().flat_map(|body| &body.refused) {
         eprintln!(
             "{triad} beside readings in SI is not calibrated: {}",
             judgement.reason
         );
     }
-    let Some(body) = body.filter(|body| !body.triads.is_empty()) else {
-        Refused::of(prepared).print();
+    let body = body.filter(|body| !body.triads.is_empty());
+    let Some((samples, body)) = samples.zip(body) else {
         return Err(why);
     };
+    let manifest = &samples.manifest;
+    let raw = manifest.raw_unit;
     let (more, judgement) = (BodyResult::of(&body, raw), body.judgement());
     let text = format!(
         "{}: gyro and accelerometer are taken as they read: {why}\n{}",
-        prepared.place,
+        samples.place,
         report::body_text(&more)
     );
     let head = serde_json::json!({
         "format": "mimu-fit/1",
-        "device": prepared.manifest.device,
+        "device": manifest.device,
         "judgement": judgement,
         "not_calibrated": why.to_string(),
         "raw_unit": raw,
     });
     let all = report::with_sensors(&head, &more);
-    let made = || Calibration::of_body(prepared, body.tables(raw), judgement.clone(), &now());
-    write(args, text, &all, &judgement, &prepared.place, made)
+    let made = || Calibration::of_body(manifest, body.tables(raw), judgement.clone(), &now());
+    write(args, text, &all, &judgement, &samples.place, made)
 }
 
 fn one(args: &FitArgs, recording: &Path) -> Result<Status> {
-    let (prepared, samples) = prepared(args, recording)?;
+    let (prepared, samples) = match prepared(args, recording) {
+        // It is nowhere still: a compass that is turned without a rest.
+        Err(why @ Error::Undetermined(_)) => {
+            return body_alone(args, Some(&open(recording, &args.log)?), &[], why);
+        }
+        read => read?,
+    };
     let place = prepared.place.clone();
     let fitted = match fit_or_faces(prepared.clone(), args.options()) {
         Ok(fitted) => fitted,
         Err(why @ Error::Undetermined(_)) => {
-            return body_alone(args, samples.as_ref(), &prepared, why);
+            let done = body_alone(args, samples.as_ref(), &prepared.dwells.list, why);
+            return done.inspect_err(|_| Refused::of(&prepared).print());
         }
         Err(why) => {
             Refused::of(&prepared).print();
@@ -346,7 +355,7 @@ fn one(args: &FitArgs, recording: &Path) -> Result<Status> {
     let is_misfit = result.judgement.needs_consent().is_some();
     // Beside a first triad that its calibration makes worse, the readings themselves are the better reference.
     let body = samples.map(|samples| match is_misfit && prepared.is_in_si() {
-        true => Body::of_readings(&samples, &prepared, &args.body()),
+        true => Body::of_readings(&samples, &prepared.dwells.list, &args.body()),
         false => Body::of(&samples, &fitted, &args.body()),
     });
     let body = body.transpose()?.flatten();

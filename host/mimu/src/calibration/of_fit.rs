@@ -11,11 +11,10 @@ use super::{
 use crate::effects::fitted::FittedEffect;
 use crate::fit::{Fit, SensorFit};
 use crate::judgement::Judgement;
-use crate::prepared::Prepared;
 use crate::quantity::{Sensor, inverse_names, rounded};
 use crate::triad::{Angles, Covariance, Estimate, Forward, Physical, Triad};
 use mimu_recording::error::Result;
-use mimu_recording::{RawUnit, Reference};
+use mimu_recording::{Manifest, RawUnit, Reference};
 
 /// Digits of standard deviations and intervals.
 const SIGMA_DIGITS: usize = 4;
@@ -33,12 +32,22 @@ impl Calibration {
             .iter()
             .map(|e| e.lasting().with_digits(SIGMA_DIGITS));
         let triad = |sensor| fit.sensor(sensor).map(|found| table(fit, found));
-        let calibration = Self {
+        let mut calibration = Self {
             gyro: triad(Sensor::Gyro),
             accel: triad(Sensor::Accel),
             effects: lasting.collect(),
-            ..Self::without_triads(&fit.prepared, Judgement::of_fit(fit), created)
+            ..Self::without_triads(&fit.prepared.manifest, Judgement::of_fit(fit), created)
         };
+        let dwells = fit.prepared.dwells.list.iter();
+        let temperatures = dwells.map(|d| d.temp_c).filter(|t| is_temperature(*t));
+        let temperatures: Vec<f64> = temperatures.collect();
+        let mean = temperatures.iter().sum::<f64>() / temperatures.len() as f64;
+        let recording = &mut calibration.recording;
+        recording.temp_c = mean.is_finite().then_some(mean);
+        recording.temp_range_c = range(&temperatures);
+        // A recording in memory has none.
+        let sha256 = &fit.prepared.condensed.sha256;
+        recording.sha256 = Some(sha256.clone()).filter(|sha| !sha.is_empty());
         let place = format!("calibration of {:?}", calibration.device);
         calibration.checked(&place)
     }
@@ -48,25 +57,20 @@ impl Calibration {
     /// # Errors
     /// There is none.
     pub fn of_body(
-        prepared: &Prepared,
+        manifest: &Manifest,
         body: Vec<BodyTriad>,
         judgement: Judgement,
         created: &str,
     ) -> Result<Self> {
         let calibration = Self {
             body,
-            ..Self::without_triads(prepared, judgement, created)
+            ..Self::without_triads(manifest, judgement, created)
         };
         let place = format!("calibration of {:?}", calibration.device);
         calibration.checked(&place)
     }
 
-    fn without_triads(prepared: &Prepared, judgement: Judgement, created: &str) -> Self {
-        let manifest = &prepared.manifest;
-        let dwells = prepared.dwells.list.iter();
-        let temperatures = dwells.map(|d| d.temp_c).filter(|t| is_temperature(*t));
-        let temperatures: Vec<f64> = temperatures.collect();
-        let mean = temperatures.iter().sum::<f64>() / temperatures.len() as f64;
+    fn without_triads(manifest: &Manifest, judgement: Judgement, created: &str) -> Self {
         Self {
             format: FORMAT.into(),
             device: manifest.device.clone(),
@@ -79,14 +83,13 @@ impl Calibration {
             judgement: Some(judgement),
             sensors: manifest.sensors().cloned(),
             recording: Origin {
-                // A recording in memory has none.
-                sha256: Some(prepared.condensed.sha256.clone()).filter(|sha| !sha.is_empty()),
+                sha256: None,
                 reference: Some(manifest.reference),
                 raw_unit: manifest.raw_unit,
                 gravity_mps2: Some(manifest.gravity_mps2),
                 clock: manifest.clock,
-                temp_c: mean.is_finite().then_some(mean),
-                temp_range_c: range(&temperatures),
+                temp_c: None,
+                temp_range_c: None,
             },
             gyro: None,
             accel: None,
