@@ -1,6 +1,6 @@
 //! Least squares whose errors are alike within pieces of time and independent between them.
 //!
-//! What a body's triads disagree by in motion is no white noise: a stamp that jitters, a field that differs by place, a carrier that bends. A covariance from the noise of
+//! What a body's triads disagree by in motion lasts for seconds: a stamp that jitters, a field that differs by place, a carrier that bends. A covariance from the noise of
 //! samples would be too small by factors. Here it comes from leaving out one cluster after the other (the jackknife, one Gauss-Newton step each): it asks only
 //! that clusters are independent, and gives the error of each cluster by a fit without it for nothing.
 

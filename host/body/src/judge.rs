@@ -10,7 +10,7 @@ use crate::field::Field;
 const BY_NOISE: f64 = 1.5;
 /// A share of the signal as an error with which a model does not describe the readings.
 const MISFIT_SHARE: f64 = 0.1;
-/// The same of a field's direction, rad: a compass that is off by 5 degrees is of no use beside a gyro.
+/// The same of a field's direction, rad: a compass that is off by 5 degrees does not help a gyro.
 const MISFIT_RAD: f64 = 0.087;
 /// Share of the pieces of time that may be left out.
 const MOST_LEFT_OUT: f64 = 0.25;

@@ -169,7 +169,7 @@ pub fn split_turns(
         let prepared = Prepared::read(&recording.pair(number)?, search, |_| ())?;
         // A pair that is not determined for itself says nothing of turns.
         if let Ok(fit) = mimu::fit::fit(prepared, mimu::fit::Options::IN_SAMPLE) {
-            // The frame of its own fit is that of its accelerometer.
+            // The accelerometer of the pair gives the frame of its fit.
             let own = TriadName {
                 kind: TriadKind::Accel,
                 number,

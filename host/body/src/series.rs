@@ -55,7 +55,7 @@ impl Series {
 
     /// Without samples that repeat the one before: a slower triad whose last reading is written again.
     ///
-    /// Where it is read in an uneven rhythm it has a clock of its own, and a new reading is on average half a row old when it is first written.
+    /// Where the rows repeat it in an uneven rhythm, another clock samples it, and a new reading is on average half a row old when it is first written.
     pub fn without_repeats(self) -> Self {
         let is_new = |k: usize| k == 0 || self.x[k] != self.x[k - 1];
         let new: Vec<usize> = (0..self.len()).filter(|k| is_new(*k)).collect();

@@ -63,7 +63,7 @@ pub(crate) fn split_text(split: &Split) -> String {
                 .to_string()
         }
         (true, false) => format!(
-            "all pairs err together, and more so with {}: it is no error of a sensor",
+            "all pairs err together, and more so with {}: the cause is not in a sensor",
             causes.join(", ")
         ),
     };

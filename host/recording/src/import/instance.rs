@@ -23,7 +23,7 @@ impl FromStr for Instance {
             return Ok(Self::All);
         }
         text.parse().map(Self::Number).map_err(|_| {
-            let problem = format!("{} is no number of a sensor", shorten(text.as_bytes()));
+            let problem = format!("{} is not the number of a sensor", shorten(text.as_bytes()));
             Error::new("instance", problem, "write its number, from 0, or all")
                 .about(Argument::Instance)
         })

@@ -1,6 +1,6 @@
 //! Further triads among the columns of a file: a magnetometer, and the second and later sensors of a kind.
 //!
-//! Two sensors of a kind are told apart by a number in their names and by nothing else: `gx1` and `gx2`, `imu0.accel.x` and `imu1.accel.x`. Names that
+//! Only a number in their names distinguishes two sensors of a kind: `gx1` and `gx2`, `imu0.accel.x` and `imu1.accel.x`. Names that
 //! differ in words may be one sensor before and after a filter, so of these the first is used, unless a person names the others.
 
 use crate::columns::Column;
