@@ -10,7 +10,7 @@ use mimu::noise::noise_file::NoiseFile;
 use mimu_recording::error::Result;
 use mimu_recording::{Column, Columns, InMemory, Manifest, RawUnit, Recording, Reference};
 use mimu_rig::random::Random;
-use nalgebra::{Rotation3, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 /// Samples of the unit, and poses of the reference, a second.
 const RATE_HZ: f64 = 200.0;
@@ -25,6 +25,8 @@ const WALK: [f64; 2] = [2e-5, 5e-4];
 pub struct Flight {
     /// Length, s.
     pub duration_s: f64,
+    /// What the readings have more than their inputs, for each input: errors of scale factors on the diagonal, of angles beside it.
+    pub error: [Matrix3<f64>; 2],
     /// Biases in the middle, rad/s and m/s².
     pub bias: [Vector3<f64>; 2],
     /// Rotation vector from the unit's axes to those of the reference, rad.
@@ -188,7 +190,11 @@ impl Flight {
                 walked[s][axis] += WALK[s] / RATE_HZ.sqrt() * random.normal();
                 let more = if moves { self.white[s] } else { 1.0 };
                 let white = more * WHITE[s] * RATE_HZ.sqrt() * random.normal();
-                inputs[s][axis] + self.bias[s][axis] + walked[s][axis] + white
+                inputs[s][axis]
+                    + (self.error[s] * inputs[s])[axis]
+                    + self.bias[s][axis]
+                    + walked[s][axis]
+                    + white
             })
         });
         let mut rows: Vec<[f64; 6]> = rows.collect();

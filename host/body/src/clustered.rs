@@ -177,7 +177,7 @@ fn jackknife(
 const SINGULAR: f64 = 1e-11;
 
 /// Inverse of a positive definite matrix whose rows may have very different scales; `None` if it is singular.
-fn inverse(of: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+pub(crate) fn inverse(of: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let scale = of.diagonal().map(|d| d.sqrt().recip());
     if !scale.iter().all(|s| s.is_finite()) {
         return None;

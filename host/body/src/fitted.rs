@@ -14,8 +14,8 @@ pub type Known<T> = Result<T, String>;
 pub struct FittedTriad {
     /// Its name.
     pub name: TriadName,
-    /// What rotation, delay and lever arm are against.
-    pub reference: TriadName,
+    /// What rotation, delay and lever arm are against; `None` for a trajectory.
+    pub reference: Option<TriadName>,
     /// Unit of its calibrated readings.
     pub unit: &'static str,
     /// Calibration, raw to `unit`, in its own frame: x along its first axis, y in the plane of the first two.

@@ -1,7 +1,7 @@
 //! Judgements of further triads.
 
 use mimu::judgement::{Judgement, JudgementKind};
-use mimu::quantity::{Sensor, significant};
+use mimu::quantity::significant;
 
 use crate::errors::Errors;
 use crate::field::Field;
@@ -22,27 +22,27 @@ pub(crate) fn undetermined(why: impl std::fmt::Display) -> Judgement {
     Judgement::new(JudgementKind::Untested, why)
 }
 
-/// Of a further gyro or accelerometer; `signal`: rms of an axis of the reference, SI.
-pub(crate) fn same_body(errors: &Errors, signal: f64, sensor: Sensor) -> Judgement {
+/// Of a gyro or accelerometer against `reference`; `signal`: rms of an axis of the reference, in `unit`.
+pub(crate) fn same_body(errors: &Errors, signal: f64, reference: &str, unit: &str) -> Judgement {
     let (held, floor) = (errors.held_out_rms, errors.noise_floor);
-    let of = |x: f64| format!("{} {}", significant(x), sensor.unit().replace("^2", "²"));
+    let of = |x: f64| format!("{} {}", significant(x), unit.replace("^2", "²"));
     if held > MISFIT_SHARE * signal {
         return misfit(format!(
-            "it does not read the motion of the first {sensor}: it differs by {} of {}; check its columns and its unit, and that both are on one rigid body",
+            "it does not read the motion of {reference}: it differs by {} of {}; check its columns and its unit, and that both are on one rigid body",
             of(held),
             of(signal)
         ));
     }
     if held > BY_NOISE * floor {
         let reason = format!(
-            "it differs from the first {sensor} by {} in pieces of time that the fit has not used, and white noise explains {}",
+            "it differs from {reference} by {} in pieces of time that the fit has not used, and white noise explains {}",
             of(held),
             of(floor)
         );
         return Judgement::new(JudgementKind::Unexplained, reason);
     }
     let reason = format!(
-        "it differs from the first {sensor} by {} in pieces of time that the fit has not used, as white noise explains ({})",
+        "it differs from {reference} by {} in pieces of time that the fit has not used, as white noise explains ({})",
         of(held),
         of(floor)
     );

@@ -16,6 +16,7 @@ mod same_body;
 mod series;
 pub mod split;
 mod standing;
+pub mod trajectory;
 mod verify;
 
 use mimu::fit::Fit;
@@ -31,6 +32,7 @@ use nalgebra::Rotation3;
 
 pub use fitted::{FittedTriad, Known};
 pub use split::Split;
+pub use trajectory::ByTrajectory;
 pub use verify::{TriadVerification, verify};
 
 use carrier::{Carrier, Unit, read};
@@ -264,9 +266,14 @@ impl Fitting<'_> {
         };
         Ok(FittedTriad {
             name,
-            reference: TriadName::first(kind),
+            reference: Some(TriadName::first(kind)),
             unit: sensor.unit(),
-            judgement: judge::same_body(&relation.errors, reference.signal(), sensor),
+            judgement: judge::same_body(
+                &relation.errors,
+                reference.signal(),
+                &format!("the first {sensor}"),
+                sensor.unit(),
+            ),
             triad: placed.triad,
             rotation: placed.rotation,
             rotation_deg: placed.rotation_deg,
@@ -316,7 +323,7 @@ impl Fitting<'_> {
         };
         Ok(FittedTriad {
             name,
-            reference: TriadName::first(TriadKind::Gyro),
+            reference: Some(TriadName::first(TriadKind::Gyro)),
             unit: if options.field_ut.is_some() {
                 "uT"
             } else {

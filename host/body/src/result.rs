@@ -49,6 +49,9 @@ pub struct TriadResult {
 /// A parameter with its uncertainty.
 #[derive(Debug, Clone, Serialize)]
 pub struct ParameterResult {
+    /// Kind.
+    #[serde(skip)]
+    pub kind: ParameterKind,
     /// Name.
     pub name: String,
     /// The estimate.
@@ -87,8 +90,8 @@ impl From<Estimate> for EstimateResult {
 pub struct PlaceResult {
     /// The triad.
     pub triad: TriadName,
-    /// What it stands to.
-    pub reference: TriadName,
+    /// What it stands to: a triad, or `trajectory`.
+    pub reference: String,
     /// Rotation vector from the frame of the triad to that of the reference, degrees.
     pub rotation_deg: [EstimateResult; 3],
     /// By how much its readings are later, ms; null if the reasons say why.
@@ -153,6 +156,16 @@ impl TriadResult {
             ),
             (ParameterKind::Bias, physical.bias, raw_unit(raw, of.unit)),
         ];
+        // A further triad has a frame of its own axes; a gyro by a trajectory is in that of the accelerometer.
+        let by_frame = match of.reference {
+            Some(_) => None,
+            None => Some((
+                ParameterKind::Misalignment,
+                physical.misalignment,
+                "rad".into(),
+            )),
+        };
+        let kinds = kinds.into_iter().chain(by_frame);
         let physical = kinds.into_iter().flat_map(|(kind, estimates, unit)| {
             let each = estimates.into_iter().enumerate();
             each.map(move |(k, estimate)| (TriadParameter(kind, k), estimate, unit.clone()))
@@ -160,6 +173,7 @@ impl TriadResult {
         let parameters = inverse
             .chain(physical)
             .map(|(name, estimate, unit)| ParameterResult {
+                kind: name.0,
                 name: name.to_string(),
                 estimate: estimate.into(),
                 unit,
@@ -196,7 +210,9 @@ impl PlaceResult {
             .map(Into::into);
         Self {
             triad: of.name,
-            reference: of.reference,
+            reference: of
+                .reference
+                .map_or("trajectory".into(), |of| of.to_string()),
             rotation_deg: of.rotation_deg.map(Into::into),
             delay_ms,
             lever_arm_mm: arm.map(|arm| arm.map(Into::into)),
@@ -229,7 +245,7 @@ fn table(of: &FittedTriad, raw: RawUnit) -> BodyTriad {
     let interval = |e: &Estimate| rounded(e.interval, DIGITS);
     BodyTriad {
         triad: of.name,
-        reference: of.reference,
+        reference: of.reference.unwrap_or(of.name),
         formula: "x = C u + o".into(),
         direction: "raw to SI".into(),
         raw_unit: raw,

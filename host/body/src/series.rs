@@ -53,6 +53,13 @@ impl Series {
         }
     }
 
+    /// Of values that are all numbers, at increasing times.
+    pub fn at_times(t: &[f64], x: Vec<Vector3<f64>>) -> Self {
+        let all: Vec<_> = t.iter().copied().zip(x).collect();
+        let whole = vec![false; all.len()];
+        Self::of(all, &whole)
+    }
+
     /// Without samples that repeat the one before: a slower triad whose last reading is written again.
     ///
     /// Where the rows repeat it in an uneven rhythm, another clock samples it, and a new reading is on average half a row old when it is first written.
@@ -118,6 +125,31 @@ impl Series {
             sum += weight.product::<f64>() * self.x[k];
         }
         Some(sum)
+    }
+
+    /// The reading at a time by a straight line; `None` outside, or in a gap.
+    pub fn line_at(&self, t: f64) -> Option<Vector3<f64>> {
+        let (at, share) = self.before(t)?;
+        Some(self.x[at].lerp(&self.x[at + 1], share))
+    }
+
+    /// Times and readings from one time to another, with those at both ends between samples; `None` if a gap or a saturated reading lies between.
+    pub fn between(&self, from: f64, to: f64) -> Option<Vec<(f64, Vector3<f64>)>> {
+        let first = self.t.partition_point(|of| *of <= from);
+        let last = self.t.partition_point(|of| *of < to);
+        if first > last || self.is_broken(first.checked_sub(1)?, last.min(self.broken.len())) {
+            return None;
+        }
+        let inner = (first..last).map(|k| (self.t[k], self.x[k]));
+        let ends = [(from, self.at(from)?), (to, self.at(to)?)];
+        Some(
+            ends[..1]
+                .iter()
+                .copied()
+                .chain(inner)
+                .chain(ends[1..].iter().copied())
+                .collect(),
+        )
     }
 
     /// Whether there is a gap, or a saturated reading, between two samples.

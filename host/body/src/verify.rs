@@ -100,7 +100,12 @@ fn one(
             let Some(errors) = Relation::errors(kind, &raw, &reference, &standing) else {
                 return Ok(None);
             };
-            let judgement = judge::same_body(&errors, reference.signal(), sensor);
+            let judgement = judge::same_body(
+                &errors,
+                reference.signal(),
+                &format!("the first {sensor}"),
+                sensor.unit(),
+            );
             (errors, judgement)
         }
     };

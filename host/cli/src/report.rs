@@ -34,6 +34,7 @@ mod thermal_plan;
 pub(crate) mod thermal_plot;
 #[cfg(not(target_family = "wasm"))]
 mod thermal_record;
+mod trajectory;
 mod unit;
 mod verify;
 mod wizard;
@@ -63,6 +64,7 @@ pub use thermal::{thermal_page, thermal_text};
 pub use thermal_plan::thermal_plan_text;
 #[cfg(not(target_family = "wasm"))]
 pub(crate) use thermal_record::{thermal_progress, thermal_record_text};
+pub(crate) use trajectory::trajectory_text;
 pub use unit::{UnitReport, trace_figure, unit_page};
 pub use verify::verify_text;
 pub use wizard::{wizard_lines, wizard_text};

@@ -10,7 +10,7 @@ mod effect;
 mod next_power_on;
 mod of_curves;
 mod of_device;
-mod of_fit;
+pub mod of_fit;
 mod of_sessions;
 mod on_device;
 mod over_temperature;

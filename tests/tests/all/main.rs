@@ -37,5 +37,6 @@ mod slow_biases;
 mod stated_noise;
 mod strong_nonlinearity;
 mod temperature;
+mod trajectory;
 mod turning;
 mod whole_turns;

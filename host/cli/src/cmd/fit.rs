@@ -7,11 +7,12 @@ use clap::{Args, ValueEnum};
 use mimu::calibration::Calibration;
 use mimu::data_sheet::DataSheet;
 use mimu::fit::{Fit, Options, fit_or_faces};
+use mimu::in_use::Trajectory;
 use mimu::judgement::Judgement;
 use mimu::noise::noise_file::NoiseFile;
 use mimu::prepared::Prepared;
 use mimu::prior::Prior;
-use mimu::quantity::Sensor;
+use mimu::quantity::{PerSensor, Sensor};
 use mimu::recording_problem::OfRecording;
 use mimu::result::fit::{DwellResult, FitResult};
 use mimu::result::sessions::SessionsResult;
@@ -22,15 +23,16 @@ use mimu::signal::stillness::DwellSearch;
 use mimu_body::result::BodyResult;
 use mimu_body::{Body, Options as BodyOptions};
 use mimu_recording::error::{Error, Result};
-use mimu_recording::{Recording, ReferenceError};
+use mimu_recording::{MANIFEST_FILE, Recording, ReferenceError};
 use serde::Serialize;
 
+use super::trajectory::{self, TrajectoryArgs};
 use crate::arguments::{
     JsonArgs, KeepArgs, NoiseArgs, PartArgs, SensorArg, StillArgs, StrictArgs, VerboseArgs,
     WholeTurnArgs, WritingArgs, with_noise,
 };
 use crate::hint::OF_A_LOG;
-use crate::output::{Results, now};
+use crate::output::{Results, check_outputs, now};
 use crate::reading::{LogArgs, open, read_with_samples};
 use crate::report;
 use crate::report::budget::budget_text;
@@ -76,6 +78,8 @@ pub struct FitArgs {
     /// Size of the Earth's field at the place, µT, for a recording with a magnetometer; without it the field counts as 1
     #[arg(long, value_name = "UT")]
     field: Option<f64>,
+    #[command(flatten)]
+    trajectory: TrajectoryArgs,
     #[command(flatten)]
     part: PartArgs,
     /// List the dwells
@@ -135,6 +139,9 @@ pub(crate) fn run(args: &FitArgs) -> Result<Status> {
             ),
             "leave --prior out: several sessions determine a unit without it",
         ));
+    }
+    if let Some(by) = args.trajectory.read()? {
+        return beside(args, &by);
     }
     match (&args.recordings[..], args.class) {
         ([recording], None) => one(args, recording),
@@ -327,7 +334,16 @@ fn body_alone(
         "raw_unit": raw,
     });
     let all = report::with_sensors(&head, &more);
-    let made = || Calibration::of_body(manifest, body.tables(raw), judgement.clone(), &now());
+    let made = || {
+        let as_read = PerSensor::from_fn(|_| None);
+        Calibration::of_body(
+            manifest,
+            as_read,
+            body.tables(raw),
+            judgement.clone(),
+            &now(),
+        )
+    };
     write(args, text, &all, &judgement, &samples.place, made)
 }
 
@@ -386,6 +402,34 @@ fn one(args: &FitArgs, recording: &Path) -> Result<Status> {
             write(args, text, &all, &result.judgement, &place, made)
         }
     }
+}
+
+/// A recording beside a trajectory.
+fn beside(args: &FitArgs, by: &Trajectory) -> Result<Status> {
+    let [recording] = &args.recordings[..] else {
+        let remedy =
+            "fit one recording with its trajectory, and verify the calibration with the others";
+        return Err(Error::new(
+            &by.place,
+            "a trajectory is of one recording, and several are given",
+            remedy,
+        ));
+    };
+    let recording = open(recording, &args.log)?;
+    let manifest = recording.directory.join(MANIFEST_FILE);
+    let mut inputs: Vec<&Path> = vec![&manifest, &recording.samples];
+    inputs.extend(args.trajectory.trajectory.as_deref());
+    check_outputs(&[args.output.as_deref(), args.json.file()], &inputs)?;
+    let made = trajectory::fitted(&recording, by)?;
+    let calibration = || Ok(made.calibration.clone());
+    write(
+        args,
+        made.text,
+        &made.json,
+        &made.judgement,
+        &recording.place,
+        calibration,
+    )
 }
 
 /// One calibration of several sessions.

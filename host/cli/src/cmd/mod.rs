@@ -20,5 +20,6 @@ pub(crate) mod noise;
 pub(crate) mod record;
 pub(crate) mod report;
 pub(crate) mod thermal;
+pub(crate) mod trajectory;
 pub(crate) mod verify;
 pub(crate) mod wizard;

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use mimu::calibration::Calibration;
-use mimu::in_use::{Against, NoiseInUse, Trajectory, noise_in_use};
+use mimu::in_use::{Against, NoiseInUse, noise_in_use};
 use mimu::noise::noise_file::NoiseFile;
 use mimu::prepared::Prepared;
 use mimu_export::kalibr::{self, Kalibr};
@@ -13,6 +13,7 @@ use mimu_export::{Sources, Target, driver};
 use mimu_recording::error::Result;
 use mimu_recording::{MANIFEST_FILE, Recording};
 
+use super::trajectory::TrajectoryArgs;
 use crate::arguments::{JsonArgs, StillArgs, StrictArgs};
 use crate::hint::OF_A_LOG;
 use crate::output::{Results, check_outputs, progress};
@@ -31,21 +32,8 @@ pub struct NoiseInUseArgs {
     /// Noise file of the unit at rest (`mimu allan -o`)
     #[arg(long, value_name = "FILE")]
     noise: PathBuf,
-    /// Poses of the unit by another instrument: ground truth of EuRoC, or of TUM's benchmarks (time, position, quaternion x y z w)
-    ///
-    /// The times are of the same clock as those of the recording. The quaternion rotates from the unit to a frame whose z points up. Where the instrument sees
-    /// the unit, how it is mounted (to some 10 degrees), and up to some 0.1 s between the clocks are estimated.
-    #[arg(long, value_name = "FILE.csv")]
-    trajectory: Option<PathBuf>,
-    /// Time of the trajectory at which the recording's t_s is 0, s: `mimu import` prints what stamps are counted from
-    #[arg(
-        long,
-        value_name = "S",
-        requires = "trajectory",
-        default_value_t = 0.0,
-        allow_negative_numbers = true
-    )]
-    trajectory_zero: f64,
+    #[command(flatten)]
+    trajectory: TrajectoryArgs,
     /// File to write: FILE.yaml for Kalibr and what reads its files; FILE.toml is a noise file, for `mimu export`
     #[arg(short, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -72,7 +60,7 @@ pub(crate) fn run(args: &NoiseInUseArgs) -> Result<Status> {
     let manifest = recording.directory.join(MANIFEST_FILE);
     let mut inputs: Vec<&Path> = vec![&manifest, &recording.samples, &args.recording, &args.noise];
     inputs.extend(args.calibration.as_deref());
-    inputs.extend(args.trajectory.as_deref());
+    inputs.extend(args.trajectory.trajectory.as_deref());
     check_outputs(&[args.output.as_deref(), args.json.file()], &inputs)?;
     let bar = progress("dead reckoning");
     let result = args.found(&recording, &calibration, &noise, &|share| bar.reach(share));
@@ -102,9 +90,8 @@ impl NoiseInUseArgs {
         noise: &NoiseFile,
         reach: &dyn Fn(f64),
     ) -> Result<NoiseInUse> {
-        match &self.trajectory {
-            Some(path) => {
-                let trajectory = Trajectory::read(path)?.counted_from(self.trajectory_zero);
+        match self.trajectory.read()? {
+            Some(trajectory) => {
                 let against = Against::Trajectory(&trajectory);
                 noise_in_use(recording, calibration, noise, against, reach)
             }

@@ -15,12 +15,13 @@ use mimu_recording::error::Result;
 use serde::Serialize;
 use serde_json::json;
 
+use super::trajectory::{self, TrajectoryArgs};
 use crate::arguments::{
     JsonArgs, NoiseArgs, PartArgs, StillArgs, StrictArgs, VerboseArgs, WholeTurnArgs, with_noise,
 };
 use crate::hint::OF_A_LOG;
 use crate::output::print;
-use crate::reading::{LogArgs, read_with_samples};
+use crate::reading::{LogArgs, open, read_with_samples};
 use crate::report;
 use crate::report::data_sheet::{WithDataSheet, data_sheet_text};
 use crate::status::Status;
@@ -40,6 +41,8 @@ pub struct VerifyArgs {
     #[command(flatten)]
     noise: NoiseArgs,
     #[command(flatten)]
+    trajectory: TrajectoryArgs,
+    #[command(flatten)]
     part: PartArgs,
     #[command(flatten)]
     strict: StrictArgs,
@@ -56,14 +59,20 @@ pub(crate) fn run(args: &VerifyArgs) -> Result<Status> {
     let outputs = [args.json.file()];
     let log = args.log.or_gravity(calibration.recording.gravity_mps2);
     let inputs = [Some(args.calibration.as_path()), args.noise.file.as_deref()];
+    if let Some(by) = args.trajectory.read()? {
+        let recording = open(&args.recording, &log)?;
+        let (text, all, judgement) = trajectory::verified(&recording, &by, &calibration)?;
+        print(&args.json, &text, &all, None)?;
+        return Ok(args.strict.status(&judgement));
+    }
     let samples = RefCell::new(None);
-    let open = |search| {
+    let opened = |search| {
         let read = read_with_samples(&args.recording, &log, search, &outputs, &inputs)?;
         samples.replace(read.1);
         Ok(read.0)
     };
     let noise = args.noise.read()?;
-    let made = args.judged(&open, noise.as_ref(), &calibration)?;
+    let made = args.judged(&opened, noise.as_ref(), &calibration)?;
     let further = samples
         .take()
         .map(|of| mimu_body::verify(&of, &calibration));

@@ -11,7 +11,7 @@ use super::{
 use crate::effects::fitted::FittedEffect;
 use crate::fit::{Fit, SensorFit};
 use crate::judgement::Judgement;
-use crate::quantity::{Sensor, inverse_names, rounded};
+use crate::quantity::{PerSensor, Sensor, inverse_names, rounded};
 use crate::triad::{Angles, Covariance, Estimate, Forward, Physical, Triad};
 use mimu_recording::error::Result;
 use mimu_recording::{Manifest, RawUnit, Reference};
@@ -19,7 +19,7 @@ use mimu_recording::{Manifest, RawUnit, Reference};
 /// Digits of standard deviations and intervals.
 const SIGMA_DIGITS: usize = 4;
 /// Digits of error figures.
-pub(crate) const FIGURE_DIGITS: usize = 7;
+pub const FIGURE_DIGITS: usize = 7;
 
 impl Calibration {
     /// The calibration of `fit`, made at `created` (RFC 3339). The fit is of readings without `effects`; the calibration stores their lasting part.
@@ -52,17 +52,20 @@ impl Calibration {
         calibration.checked(&place)
     }
 
-    /// The calibration of further triads alone, beside a gyro and an accelerometer that are taken as they read.
+    /// The calibration of these triads and further ones; a gyro or an accelerometer without a table is taken as it reads.
     ///
     /// # Errors
     /// There is none.
     pub fn of_body(
         manifest: &Manifest,
+        triads: PerSensor<Option<TriadTable>>,
         body: Vec<BodyTriad>,
         judgement: Judgement,
         created: &str,
     ) -> Result<Self> {
         let calibration = Self {
+            gyro: triads.gyro,
+            accel: triads.accel,
             body,
             ..Self::without_triads(manifest, judgement, created)
         };
@@ -148,7 +151,7 @@ fn table(fit: &Fit, found: &SensorFit) -> TriadTable {
 }
 
 /// The table of a triad whose axes are those of `frame`.
-pub(super) fn triad_table(
+pub fn triad_table(
     triad: &Triad,
     sensor: Sensor,
     raw_unit: RawUnit,

@@ -27,7 +27,7 @@ mod trajectory_file;
 mod walk;
 
 pub use component::Cause;
-pub use trajectory_file::Trajectory;
+pub use trajectory_file::{Pose, Trajectory};
 pub use walk::VIBRATION_HZ;
 
 use nalgebra::{DMatrix, Matrix3};

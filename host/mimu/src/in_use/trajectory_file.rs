@@ -10,9 +10,12 @@ use mimu_recording::read_text;
 
 /// Attitude (body to the frame of the reference) and position, m, at an instant.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Pose {
+pub struct Pose {
+    /// Time, s.
     pub t_s: f64,
+    /// Body to reference.
     pub attitude: UnitQuaternion<f64>,
+    /// In the frame of the reference, m.
     pub position: Vector3<f64>,
 }
 
@@ -92,6 +95,16 @@ impl Trajectory {
             has_positions: layout.is_some_and(|l| l.position.is_some()),
             place: place.to_owned(),
         })
+    }
+
+    /// Its poses.
+    pub fn poses(&self) -> &[Pose] {
+        &self.poses
+    }
+
+    /// Whether it has positions beside attitudes.
+    pub fn has_positions(&self) -> bool {
+        self.has_positions
     }
 
     /// The same with its times counted from `zero_s`.

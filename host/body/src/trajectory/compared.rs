@@ -1,0 +1,533 @@
+//! Readings of a gyro or an accelerometer, compared with poses over windows of time.
+//!
+//! A turn between two poses is that of the integrated rates; the second difference of three positions is the specific force that was turned into the frame of the
+//! reference, less gravity, weighted by a triangle over the window. Nothing is differentiated: the ends of the windows are poses as they were measured.
+
+use nalgebra::{DMatrix, DVector, Matrix3, UnitQuaternion, Vector3};
+
+use super::poses::Poses;
+use crate::clustered::{Clusters, Solution};
+use crate::pieces::{Groups, Pieces};
+use crate::series::Series;
+use mimu::triad::{affine, vector};
+use mimu_core::compensation::Affine;
+
+/// Length of a turn, s, and of each half of a window of positions. The noise of attitudes is that of two stamps, so that longer turns know a rate better.
+pub(super) const TURN_S: f64 = 1.0;
+const HALF_S: f64 = 0.25;
+pub(super) const FORCE_S: f64 = 2.0 * HALF_S;
+/// Length of the turns that the search begins with: they are about one axis.
+const SHORT_S: f64 = 0.2;
+/// A rate above which a window is one of motion, rad/s.
+const MOVING: f64 = 0.1;
+
+/// Parameters: C by rows, o, by how much the readings are later (s), and by how much more with each second; of an accelerometer also the tilt of the frame of the
+/// reference (rad), and the arm from the point of the reference (m).
+pub(super) const DELAY: usize = 12;
+pub(super) const CLOCK: usize = 13;
+pub(super) const TILT: usize = 14;
+pub(super) const ARM: usize = 16;
+/// What is known of them beforehand, standard deviations: the delay about what the search found.
+const DELAY_S: f64 = 0.05;
+const CLOCK_RATE: f64 = 3e-4;
+const TILT_RAD: f64 = 0.05;
+pub(super) const ARM_M: f64 = 0.5;
+/// Most steps; the change of the delay at which they end, s, and the longest.
+const STEPS: usize = 20;
+const SETTLED_S: f64 = 1e-7;
+const LONGEST_STEP_S: f64 = 0.03;
+
+/// Poses at the ends of a window, and in its middle for positions.
+#[derive(Clone, Copy)]
+struct Window {
+    from: usize,
+    middle: usize,
+    to: usize,
+    piece: usize,
+    /// Number of its attitude among those that differ by [`CELL_RAD`].
+    cell: usize,
+    moves: bool,
+}
+
+/// Attitudes that are nearer than this share the error of the instrument, rad: 30 degrees.
+const CELL_RAD: f64 = 0.52;
+
+/// What the readings of a window give, and what changes it.
+struct Reckoned {
+    residual: Vector3<f64>,
+    by: DMatrix<f64>,
+}
+
+/// How gravity points in the frame of the reference: up, and two directions across.
+#[derive(Clone, Copy)]
+pub(super) struct Up {
+    pub along: Vector3<f64>,
+    pub across: [Vector3<f64>; 2],
+    pub gravity: f64,
+}
+
+impl Up {
+    /// Along an axis of the reference, forth or back.
+    pub fn axis(axis: usize, sign: f64, gravity: f64) -> Self {
+        let of = |k: usize| Vector3::ith(k % 3, 1.0);
+        Self {
+            along: sign * of(axis),
+            across: [of(axis + 1), of(axis + 2)],
+            gravity,
+        }
+    }
+
+    /// The acceleration of free fall, m/s², and its derivatives by the tilt.
+    fn fall(&self, tilt: [f64; 2]) -> (Vector3<f64>, [Vector3<f64>; 2]) {
+        let left = (1.0 - tilt[0].powi(2) - tilt[1].powi(2)).max(0.01).sqrt();
+        let across = self.across[0] * tilt[0] + self.across[1] * tilt[1];
+        let by = |k: usize| -self.gravity * (self.across[k] - self.along * (tilt[k] / left));
+        let fall = -self.gravity * (self.along * left + across);
+        (fall, [by(0), by(1)])
+    }
+}
+
+/// A triad and the poses.
+pub(super) struct Compared<'a> {
+    pub raw: &'a Series,
+    pub poses: &'a Poses,
+    /// Of an accelerometer.
+    pub up: Option<Up>,
+    pub pieces: Pieces,
+    windows: Vec<Window>,
+    middle_s: f64,
+}
+
+/// What may move: all of C and o, or, of a calibration that is judged, its rotation and o.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum Free {
+    All,
+    Mounting,
+}
+
+impl<'a> Compared<'a> {
+    pub fn new(raw: &'a Series, poses: &'a Poses, up: Option<Up>) -> Option<Self> {
+        let pieces = Pieces::over(&poses.t)?;
+        let (length, half) = match up {
+            None => (TURN_S, 0.5 * TURN_S),
+            Some(_) => (FORCE_S, HALF_S),
+        };
+        let mut all = Self {
+            raw,
+            poses,
+            up,
+            windows: Vec::new(),
+            middle_s: 0.5 * (poses.t[0] + poses.t[poses.t.len() - 1]),
+            pieces,
+        };
+        all.windows = all.cut(length, half);
+        Some(all)
+    }
+
+    /// Windows of this length, each beginning where that before ends, or in its middle for positions.
+    fn cut(&self, length: f64, half: f64) -> Vec<Window> {
+        let poses = self.poses;
+        let mut windows = Vec::new();
+        let mut cells: Vec<UnitQuaternion<f64>> = Vec::new();
+        let mut from = 0;
+        while poses.t[from] + length <= poses.t[poses.t.len() - 1] {
+            let [middle, to] = [half, length].map(|s| poses.near(poses.t[from] + s));
+            if from < middle && middle < to && poses.is_dense(from, to) {
+                let rate = poses.turn(from, to).norm() / (poses.t[to] - poses.t[from]);
+                let attitude = poses.attitude[middle];
+                let near = cells
+                    .iter()
+                    .position(|of| of.angle_to(&attitude) < CELL_RAD);
+                let cell = near.unwrap_or_else(|| {
+                    cells.push(attitude);
+                    cells.len() - 1
+                });
+                windows.push(Window {
+                    from,
+                    middle,
+                    to,
+                    cell,
+                    piece: self.pieces.of(poses.t[middle]),
+                    moves: rate > MOVING,
+                });
+            }
+            from = match self.up {
+                None => to,
+                Some(_) => middle,
+            }
+            .max(from + 1);
+        }
+        windows
+    }
+
+    /// Number of parameters.
+    pub fn parameters(&self) -> usize {
+        self.up.map_or(TILT, |_| ARM + 3)
+    }
+
+    /// C and o, and the rms residual, with a delay, by plain least squares over short turns.
+    pub fn start_of_turns(&self, delay_s: f64) -> Option<(DVector<f64>, f64)> {
+        let mut normal = DMatrix::<f64>::zeros(4, 4);
+        let mut right = DMatrix::<f64>::zeros(4, 3);
+        let (mut squares, mut count) = (0.0, 0.0);
+        for window in self.cut(SHORT_S, 0.5 * SHORT_S) {
+            let [a, b] = [window.from, window.to].map(|k| self.poses.t[k]);
+            let Some(nodes) = self.raw.between(a + delay_s, b + delay_s) else {
+                continue;
+            };
+            let sums = nodes
+                .windows(2)
+                .map(|w| 0.5 * (w[1].0 - w[0].0) * (w[0].1 + w[1].1));
+            let mean = sums.sum::<Vector3<f64>>() / (b - a);
+            let rate = self.poses.turn(window.from, window.to) / (b - a);
+            let row = DVector::from_vec(vec![mean.x, mean.y, mean.z, 1.0]);
+            normal += &row * row.transpose();
+            right += &row * rate.transpose();
+            squares += rate.norm_squared();
+            count += 3.0;
+        }
+        let found = crate::clustered::inverse(&normal)? * &right;
+        let mut at = DVector::zeros(self.parameters());
+        for axis in 0..3 {
+            for k in 0..3 {
+                at[3 * axis + k] = found[(k, axis)];
+            }
+            at[9 + axis] = found[(3, axis)];
+        }
+        at[DELAY] = delay_s;
+        Some((at, ((squares - found.dot(&right)).max(0.0) / count).sqrt()))
+    }
+
+    /// C and o of an accelerometer, and the sum of squares, by plain least squares, with the delay of the gyro.
+    pub fn start_of_forces(&self, delay_s: f64, clock: f64) -> Option<(DVector<f64>, f64)> {
+        let mut at = DVector::zeros(self.parameters());
+        (at[DELAY], at[CLOCK]) = (delay_s, clock);
+        let solution = self.clusters(
+            &at,
+            &mut Groups::default(),
+            &vec![true; self.pieces.count],
+            Free::All,
+        );
+        at += &solution.solve(&vec![true; self.pieces.count])?.step;
+        (at[DELAY], at[CLOCK]) = (delay_s, clock);
+        let errors = self.squares(&at, &vec![true; self.pieces.count]);
+        Some((at, errors.iter().sum::<f64>() / errors.len() as f64))
+    }
+
+    /// How much later the readings are than the poses at a time of these.
+    fn lag(&self, at: &DVector<f64>, t: f64) -> f64 {
+        at[DELAY] + at[CLOCK] * (t - self.middle_s)
+    }
+
+    fn reckoned(&self, window: &Window, at: &DVector<f64>) -> Option<Reckoned> {
+        match self.up {
+            None => self.turn(window, at),
+            Some(up) => self.force(window, at, &up),
+        }
+    }
+
+    fn turn(&self, window: &Window, at: &DVector<f64>) -> Option<Reckoned> {
+        let [a, b] = [window.from, window.to].map(|k| self.poses.t[k]);
+        let nodes = self.raw.between(a + self.lag(at, a), b + self.lag(at, b))?;
+        let model = affine(&at.fixed_rows::<12>(0).into_owned());
+        // From the end back: what turns after a step takes its error to the end.
+        let mut after = UnitQuaternion::identity();
+        let mut by_reading = [Matrix3::<f64>::zeros(); 4];
+        for pair in nodes.windows(2).rev() {
+            let time = pair[1].0 - pair[0].0;
+            let u = 0.5 * (pair[0].1 + pair[1].1);
+            let half = UnitQuaternion::from_scaled_axis(0.5 * time * model.apply(&u));
+            let to_end = (half * after).inverse().to_rotation_matrix().into_inner();
+            for (sum, reading) in by_reading.iter_mut().zip([u.x, u.y, u.z, 1.0]) {
+                *sum += to_end * (reading * time);
+            }
+            after = half * half * after;
+        }
+        let seen = self.poses.attitude[window.from].inverse() * self.poses.attitude[window.to];
+        let time = b - a;
+        let mut by = DMatrix::zeros(3, self.parameters());
+        fill(&mut by, &by_reading.map(|sum| sum / time));
+        let ends = [nodes[0].1, nodes[nodes.len() - 1].1].map(|u| model.apply(&u) / time);
+        let (first, last) = (after.inverse() * ends[0], ends[1]);
+        by.set_column(DELAY, &(last - first));
+        by.set_column(
+            CLOCK,
+            &(last * (b - self.middle_s) - first * (a - self.middle_s)),
+        );
+        Some(Reckoned {
+            residual: (after.inverse() * seen).scaled_axis() / time,
+            by,
+        })
+    }
+
+    /// Mean of the specific force in the frame of the reference, weighted by a triangle: its derivatives by reading and by one.
+    fn weighted(&self, window: &Window, lag: f64) -> Option<[Matrix3<f64>; 4]> {
+        let [a, m, b] = [window.from, window.middle, window.to].map(|k| self.poses.t[k]);
+        let mut sums = [Matrix3::<f64>::zeros(); 4];
+        for (from, to, rises) in [(a, m, true), (m, b, false)] {
+            let nodes = self.raw.between(from + lag, to + lag)?;
+            let mut last: Option<(f64, [Matrix3<f64>; 4])> = None;
+            for (t, u) in nodes {
+                // Rounding may lead out of the window by a bit.
+                let t = (t - lag).clamp(from, to);
+                let share = (t - from) / (to - from);
+                let weight = if rises { share } else { 1.0 - share };
+                let turned = self.poses.attitude_at(t)?.to_rotation_matrix().into_inner();
+                let now = [u.x, u.y, u.z, 1.0].map(|reading| turned * (weight * reading));
+                if let Some((before, values)) = last {
+                    for k in 0..4 {
+                        sums[k] += (values[k] + now[k]) * (0.5 * (t - before));
+                    }
+                }
+                last = Some((t, now));
+            }
+        }
+        Some(sums.map(|sum| sum / (0.5 * (b - a))))
+    }
+
+    fn force(&self, window: &Window, at: &DVector<f64>, up: &Up) -> Option<Reckoned> {
+        let poses = [window.from, window.middle, window.to];
+        let [a, m, b] = poses.map(|k| self.poses.t[k]);
+        let lag = self.lag(at, m);
+        let by_reading = self.weighted(window, lag)?;
+        let position = self.poses.position.as_ref()?;
+        let second = |of: [Matrix3<f64>; 3]| {
+            ((of[2] - of[1]) / (b - m) - (of[1] - of[0]) / (m - a)) / (0.5 * (b - a))
+        };
+        let moved =
+            second(poses.map(|k| {
+                Matrix3::from_columns(&[position[k], Vector3::zeros(), Vector3::zeros()])
+            }))
+            .column(0)
+            .into_owned();
+        let turned =
+            second(poses.map(|k| self.poses.attitude[k].to_rotation_matrix().into_inner()));
+        let (fall, by_tilt) = up.fall([at[TILT], at[TILT + 1]]);
+        let mut by = DMatrix::zeros(3, self.parameters());
+        fill(&mut by, &by_reading);
+        let model = at.fixed_rows::<12>(0).into_owned();
+        let arm: Vector3<f64> = at.fixed_rows::<3>(ARM).into_owned();
+        let reckoned = by.columns(0, 12) * model + fall - turned * arm;
+        // Readings half a sample later and earlier.
+        let step = 0.5 * self.raw.period;
+        let mut moves = [Vector3::zeros(); 2];
+        for (moved, step) in moves.iter_mut().zip([step, -step]) {
+            let mut other = DMatrix::zeros(3, 12);
+            fill(&mut other, &self.weighted(window, lag + step)?);
+            *moved = Vector3::from_column_slice((other * model).as_slice());
+        }
+        let by_delay = (moves[0] - moves[1]) / (2.0 * step);
+        by.set_column(DELAY, &by_delay);
+        by.set_column(CLOCK, &(by_delay * (m - self.middle_s)));
+        by.set_column(TILT, &by_tilt[0]);
+        by.set_column(TILT + 1, &by_tilt[1]);
+        by.fixed_view_mut::<3, 3>(0, ARM).copy_from(&-turned);
+        Some(Reckoned {
+            residual: moved - reckoned,
+            by,
+        })
+    }
+
+    /// Steps until delay and weights stand still, and leaves out pieces that the rest contradicts; the parameters, the last solution, and which pieces are used.
+    pub fn settle(
+        &self,
+        mut at: DVector<f64>,
+        free: Free,
+    ) -> Option<(DVector<f64>, Solution, Vec<bool>)> {
+        let mut groups = Groups::default();
+        let mut used = vec![true; self.pieces.count];
+        for round in 0..4 {
+            let mut last = None;
+            for _ in 0..STEPS {
+                let solution = self.clusters(&at, &mut groups, &used, free).solve(&used)?;
+                let mut step = self.map(&at, free) * &solution.step;
+                let longest = step[DELAY].abs() / LONGEST_STEP_S;
+                if longest > 1.0 {
+                    step /= longest;
+                }
+                let is_settled = step[DELAY].abs() < SETTLED_S && groups.are_settled();
+                self.step(&mut at, &step, &solution.step, free);
+                last = Some(solution);
+                if is_settled {
+                    break;
+                }
+            }
+            let solution = last?;
+            let next = self.pieces.kept(&solution.held_out);
+            if round == 3 || next == used {
+                let covariance = self.by_attitude(&at, &mut groups, &used, free, &solution);
+                return Some((
+                    at,
+                    Solution {
+                        covariance,
+                        ..solution
+                    },
+                    used,
+                ));
+            }
+            used = next;
+        }
+        None
+    }
+
+    /// The covariance by leaving out one attitude after the other, if it is the larger: an instrument errs by where it sees its markers, alike whenever the body is turned so.
+    fn by_attitude(
+        &self,
+        at: &DVector<f64>,
+        groups: &mut Groups,
+        used: &[bool],
+        free: Free,
+        by_time: &Solution,
+    ) -> DMatrix<f64> {
+        let cells = self.windows.iter().map(|w| w.cell).max().unwrap_or(0) + 1;
+        let own = self.windows.iter().filter(|w| used[w.piece]);
+        let clusters = self.sums(at, groups, free, own.map(|w| (w, w.cell, true)), cells);
+        let Some(other) = clusters.solve(&vec![true; cells]) else {
+            return by_time.covariance.clone();
+        };
+        let size = |of: &DMatrix<f64>| {
+            (0..of.nrows())
+                .map(|k| of[(k, k)] / by_time.by_weights[(k, k)])
+                .sum::<f64>()
+        };
+        match size(&other.covariance) > size(&by_time.covariance) {
+            true => other.covariance,
+            false => by_time.covariance.clone(),
+        }
+    }
+
+    /// Derivatives of all parameters by those that are free.
+    fn map(&self, at: &DVector<f64>, free: Free) -> DMatrix<f64> {
+        let n = self.parameters();
+        if free == Free::All {
+            return DMatrix::identity(n, n);
+        }
+        let model = affine(&at.fixed_rows::<12>(0).into_owned());
+        let mut map = DMatrix::zeros(n, n - 6);
+        for k in 0..3 {
+            let turned = Vector3::<f64>::ith(k, 1.0).cross_matrix() * model.matrix;
+            map.fixed_view_mut::<12, 1>(0, k)
+                .copy_from(&vector(&turned, &Vector3::zeros()));
+        }
+        for k in 9..n {
+            map[(k, k - 6)] = 1.0;
+        }
+        map
+    }
+
+    /// Takes a step; a rotation stays one.
+    fn step(&self, at: &mut DVector<f64>, step: &DVector<f64>, own: &DVector<f64>, free: Free) {
+        let before = affine(&at.fixed_rows::<12>(0).into_owned());
+        *at += step;
+        if free == Free::Mounting {
+            let share = step[DELAY] / own[6];
+            let share = if share.is_finite() { share } else { 1.0 };
+            let turn = UnitQuaternion::from_scaled_axis(own.fixed_rows::<3>(0) * share);
+            let matrix = turn.to_rotation_matrix() * before.matrix;
+            let offset = at.fixed_rows::<3>(9).into_owned();
+            at.fixed_rows_mut::<12>(0)
+                .copy_from(&vector(&matrix, &offset));
+        }
+    }
+
+    fn clusters(
+        &self,
+        at: &DVector<f64>,
+        groups: &mut Groups,
+        used: &[bool],
+        free: Free,
+    ) -> Clusters {
+        let own = self.windows.iter().map(|w| (w, w.piece, used[w.piece]));
+        self.sums(at, groups, free, own, self.pieces.count)
+    }
+
+    /// Normal equations of windows, each with the number of its cluster of so many, and whether its residual counts for the scatter.
+    fn sums<'w>(
+        &self,
+        at: &DVector<f64>,
+        groups: &mut Groups,
+        free: Free,
+        windows: impl Iterator<Item = (&'w Window, usize, bool)>,
+        clusters: usize,
+    ) -> Clusters {
+        let map = self.map(at, free);
+        let mut known = DVector::repeat(self.parameters(), f64::INFINITY);
+        (known[DELAY], known[CLOCK]) = (DELAY_S, CLOCK_RATE);
+        for k in TILT..self.parameters() {
+            known[k] = if k < ARM { TILT_RAD } else { ARM_M };
+        }
+        let skipped = self.parameters() - map.ncols();
+        let own = |of: &DVector<f64>| of.rows(skipped, map.ncols()).into_owned();
+        let mut value = DVector::zeros(self.parameters());
+        value[DELAY] = at[DELAY];
+        let mut clusters = Clusters::new(clusters, &own(at), &own(&value), &own(&known));
+        groups.begin();
+        for (window, cluster, counts) in windows {
+            let Some(Reckoned { residual, by }) = self.reckoned(window, at) else {
+                continue;
+            };
+            let by = by * &map;
+            let group = usize::from(window.moves);
+            if counts {
+                groups.count(group, residual.norm_squared(), 3.0);
+            }
+            let weight = groups.weight(group);
+            for axis in 0..3 {
+                clusters.add(cluster, residual[axis], &by.row(axis).transpose(), weight);
+            }
+        }
+        groups.end();
+        clusters
+    }
+
+    /// Mean squares of the residuals of each window, SI².
+    pub fn squares(&self, at: &DVector<f64>, used: &[bool]) -> Vec<f64> {
+        let windows = self.windows.iter().filter(|w| used[w.piece]);
+        let squares =
+            windows.filter_map(|w| Some(self.reckoned(w, at)?.residual.norm_squared() / 3.0));
+        squares.collect()
+    }
+
+    /// Variance of the mean squares by white noise of poses and readings.
+    pub fn noise(&self, model: &Affine<f64>) -> f64 {
+        let (attitude, position) = self.poses.noise();
+        let length = match self.up {
+            None => TURN_S,
+            Some(_) => FORCE_S,
+        };
+        let samples = ((length / self.raw.period).round() as usize).max(1);
+        let own = self.raw.noise_of_means(samples) * model.matrix.norm_squared() / 3.0;
+        let poses = match self.up {
+            None => 2.0 * (attitude / TURN_S).powi(2),
+            Some(_) => 6.0 * (position.unwrap_or(f64::NAN) / HALF_S.powi(2)).powi(2),
+        };
+        own + poses
+    }
+
+    /// Rms of what is compared, of an axis, SI: the rate of turns, or the specific force.
+    pub fn signal(&self) -> f64 {
+        match self.up {
+            Some(up) => up.gravity / 3f64.sqrt(),
+            None => {
+                let rate = |w: &Window| {
+                    self.poses.turn(w.from, w.to).norm_squared()
+                        / (self.poses.t[w.to] - self.poses.t[w.from]).powi(2)
+                };
+                (self.windows.iter().map(rate).sum::<f64>() / self.windows.len() as f64 / 3.0)
+                    .sqrt()
+            }
+        }
+    }
+}
+
+/// Derivatives by C and o from those by each reading, and by one.
+fn fill(by: &mut DMatrix<f64>, by_reading: &[Matrix3<f64>; 4]) {
+    for i in 0..3 {
+        for j in 0..3 {
+            by.fixed_view_mut::<3, 1>(0, 3 * i + j)
+                .copy_from(&by_reading[j].column(i));
+        }
+        by.fixed_view_mut::<3, 1>(0, 9 + i)
+            .copy_from(&by_reading[3].column(i));
+    }
+}

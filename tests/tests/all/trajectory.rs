@@ -1,0 +1,109 @@
+//! Units beside a trajectory that was computed from the same curves as their readings.
+
+use mimu::quantity::Sensor;
+use mimu::triad::Angles;
+use mimu_body::ByTrajectory;
+use mimu_rig::random::Random;
+use mimu_tests::flight::Flight;
+use nalgebra::{Matrix3, Vector3};
+
+/// A flight of a unit with errors of a percent, mounted and timed anyhow.
+fn flight(seed: u64) -> Flight {
+    let mut random = Random::new(seed, "unit");
+    let mut vector = |size: f64| Vector3::from_fn(|_, _| size * random.normal());
+    let [gyro, accel] = [0, 1].map(|_| Matrix3::from_columns(&[0, 1, 2].map(|_| vector(0.01))));
+    Flight {
+        duration_s: 180.0,
+        error: [gyro, accel],
+        bias: [vector(0.01), vector(0.1)],
+        mounting: vector(0.5),
+        lever_m: vector(0.05),
+        late_s: vector(0.1).x,
+        reference: [1e-3, 5e-4],
+        white: [1.0, 1.0],
+        rests: false,
+    }
+}
+
+/// Errors in units of half a 95 % interval, with their names.
+fn errors(seed: u64) -> (ByTrajectory, Vec<(String, f64, f64)>) {
+    let flight = flight(seed);
+    let (recording, trajectory) = flight.flown(seed);
+    let found = ByTrajectory::of(&recording, &trajectory).unwrap();
+    let mut errors = Vec::new();
+    let mut add = |name: &str, value: f64, half: f64, truth: f64| {
+        errors.push((name.to_string(), value - truth, half))
+    };
+    for (s, sensor) in Sensor::BOTH.into_iter().enumerate() {
+        let of = &found.body.triads[s];
+        assert_eq!(of.name.to_string(), sensor.to_string());
+        let physical = of.triad.physical(Angles::Exact);
+        let forward = Matrix3::identity() + flight.error[s];
+        for k in 0..3 {
+            let scale = &physical.scale[k];
+            add(
+                &format!("{sensor} scale"),
+                scale.value,
+                scale.interval,
+                forward.row(k).norm(),
+            );
+            let bias = &physical.bias[k];
+            add(
+                &format!("{sensor} bias"),
+                bias.value,
+                bias.interval,
+                flight.bias[s][k],
+            );
+        }
+        // Angles between pairs of axes.
+        let angle = |k: usize| {
+            let [a, b] = [(1, 2), (2, 0), (0, 1)].map(|p| [p.0, p.1])[k];
+            forward
+                .row(a)
+                .normalize()
+                .dot(&forward.row(b).normalize())
+                .asin()
+        };
+        let sum: f64 = (0..3).map(|k| angle(k).abs()).sum();
+        assert!(sum > 0.0);
+        let delay = of.delay_ms.as_ref().unwrap();
+        add(
+            &format!("{sensor} delay"),
+            delay.value,
+            delay.interval,
+            -1e3 * flight.late_s,
+        );
+    }
+    let accel = &found.body.triads[1];
+    let arm = nalgebra::Rotation3::from_scaled_axis(flight.mounting).inverse() * -flight.lever_m;
+    for (k, found) in accel.lever_arm_mm.as_ref().unwrap().iter().enumerate() {
+        add("arm", found.value, found.interval, 1e3 * arm[k]);
+    }
+    (found, errors)
+}
+
+#[test]
+fn a_unit_by_a_trajectory_is_what_it_is_within_its_intervals() {
+    let mut by_kind: std::collections::BTreeMap<String, Vec<(f64, f64)>> = Default::default();
+    for seed in 0..8 {
+        let (found, errors) = errors(seed);
+        println!("{seed}: {}", found.body.judgement());
+        for (name, error, half) in errors {
+            by_kind.entry(name).or_default().push((error, half));
+        }
+    }
+    let (mut inside, mut all) = (0, 0);
+    for (name, of) in by_kind {
+        let rms = (of.iter().map(|(e, _)| e * e).sum::<f64>() / of.len() as f64).sqrt();
+        let own = of.iter().filter(|(e, half)| e.abs() < *half).count();
+        println!(
+            "{name}: rms {rms:.3e}, half {:.3e}, {own} of {}",
+            of[0].1,
+            of.len()
+        );
+        inside += own;
+        all += of.len();
+    }
+    let share = inside as f64 / all as f64;
+    assert!((0.9..=0.99).contains(&share), "{share}");
+}
