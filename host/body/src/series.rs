@@ -53,13 +53,6 @@ impl Series {
         }
     }
 
-    /// Of values that are all numbers, at increasing times.
-    pub fn at_times(t: &[f64], x: Vec<Vector3<f64>>) -> Self {
-        let all: Vec<_> = t.iter().copied().zip(x).collect();
-        let whole = vec![false; all.len()];
-        Self::of(all, &whole)
-    }
-
     /// Without samples that repeat the one before: a slower triad whose last reading is written again.
     ///
     /// Where the rows repeat it in an uneven rhythm, another clock samples it, and a new reading is on average half a row old when it is first written.

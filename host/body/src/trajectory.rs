@@ -105,18 +105,21 @@ struct Found {
     errors: Errors,
     left_out: Vec<[f64; 2]>,
     signal: f64,
+    /// White noise of an attitude, rad, or of a position, m.
+    pose_noise: f64,
 }
 
 impl Found {
     fn of(compared: &Compared, start: DVector<f64>, free: Free) -> Option<Self> {
         let (at, solution, used) = compared.settle(start, free)?;
-        let noise = compared.noise(&model(&at));
-        let mut errors = Errors::of(&compared.squares(&at, &used), noise)?;
+        let (squares, noise) = compared.errors(&at, &used);
+        let mut errors = Errors::of(&squares, noise.variance)?;
         errors.held_out_rms *= solution.unseen(&used);
         Some(Self {
             errors,
             left_out: compared.pieces.spans(&used),
             signal: compared.signal(),
+            pose_noise: noise.pose,
             at,
             solution,
         })
@@ -203,7 +206,7 @@ impl ByTrajectory {
                 "turn it about all three axes, by half a turn and more",
             )
         })?;
-        let mut all = Self::alone(&turns, &found);
+        let mut all = Self::alone(turns.reversed, &found);
         let accel = all.accelerometer(recording, &turns.poses, &found)?;
         let gyro = fitted::placed(&model(&found.at), &[found.part()]);
         let gyro = gyro.map(|own| match accel {
@@ -224,8 +227,7 @@ impl ByTrajectory {
         Ok(all)
     }
 
-    fn alone(turns: &Turns, found: &Found) -> Self {
-        let (attitude, position) = turns.poses.noise();
+    fn alone(reversed: bool, found: &Found) -> Self {
         Self {
             body: Body {
                 triads: Vec::new(),
@@ -234,9 +236,9 @@ impl ByTrajectory {
             clock_ppm: found.estimate(CLOCK, 1e6),
             tilt_deg: None,
             up: None,
-            reversed: turns.reversed,
-            attitude_noise_deg: attitude.to_degrees(),
-            position_noise_mm: position.map(|m| 1e3 * m),
+            reversed,
+            attitude_noise_deg: found.pose_noise.to_degrees(),
+            position_noise_mm: None,
         }
     }
 
@@ -276,6 +278,7 @@ impl ByTrajectory {
             return Ok(None);
         };
         self.up = Some(up);
+        self.position_noise_mm = Some(1e3 * found.pose_noise);
         self.tilt_deg = Some([TILT, TILT + 1].map(|k| found.estimate(k, 1f64.to_degrees())));
         let rotation = placed.rotation;
         let triad = self.triad(

@@ -102,7 +102,7 @@ fn flight(seed: u64, white: f64) -> Flight {
         late_s: vector(0.02).x,
         reference: [vector(1e-3).x.abs(), vector(2e-3).x.abs()],
         white: [white; 2],
-        rests: false,
+        ..Flight::default()
     }
 }
 
@@ -185,7 +185,7 @@ fn biases_mounting_and_clock_of_a_trajectory_are_no_noise() {
         late_s: 0.06,
         reference: [3e-4, 1e-3],
         white: [1.0; 2],
-        rests: false,
+        ..Flight::default()
     };
     let found = flown(&flight, 1);
     println!("{}", row(Wrong::Nothing, 1, &found));

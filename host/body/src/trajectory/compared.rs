@@ -10,7 +10,6 @@ use crate::clustered::{Clusters, Solution};
 use crate::pieces::{Groups, Pieces};
 use crate::series::Series;
 use mimu::triad::{affine, vector};
-use mimu_core::compensation::Affine;
 
 /// Length of a turn, s, and of each half of a window of positions. The noise of attitudes is that of two stamps, so that longer turns know a rate better.
 pub(super) const TURN_S: f64 = 1.0;
@@ -96,6 +95,14 @@ pub(super) struct Compared<'a> {
     pub pieces: Pieces,
     windows: Vec<Window>,
     middle_s: f64,
+}
+
+/// White noise.
+pub(super) struct Noise {
+    /// Of a window, mean over the axes, SI².
+    pub variance: f64,
+    /// Of a pose, standard deviation of an axis: attitude, rad, or position, m.
+    pub pose: f64,
 }
 
 /// What may move: all of C and o, or, of a calibration that is judged, its rotation and o.
@@ -210,7 +217,7 @@ impl<'a> Compared<'a> {
         );
         at += &solution.solve(&vec![true; self.pieces.count])?.step;
         (at[DELAY], at[CLOCK]) = (delay_s, clock);
-        let errors = self.squares(&at, &vec![true; self.pieces.count]);
+        let (errors, _) = self.errors(&at, &vec![true; self.pieces.count]);
         Some((at, errors.iter().sum::<f64>() / errors.len() as f64))
     }
 
@@ -480,28 +487,51 @@ impl<'a> Compared<'a> {
         clusters
     }
 
-    /// Mean squares of the residuals of each window, SI².
-    pub fn squares(&self, at: &DVector<f64>, used: &[bool]) -> Vec<f64> {
-        let windows = self.windows.iter().filter(|w| used[w.piece]);
-        let squares =
-            windows.filter_map(|w| Some(self.reckoned(w, at)?.residual.norm_squared() / 3.0));
-        squares.collect()
+    /// Mean squares of the residuals of each window, SI², and what white noise of poses and readings makes of them.
+    pub fn errors(&self, at: &DVector<f64>, used: &[bool]) -> (Vec<f64>, Noise) {
+        let mut squares = Vec::new();
+        let (mut next, mut pairs) = (0.0, 0.0);
+        let mut last: Option<(usize, Vector3<f64>)> = None;
+        for window in self.windows.iter().filter(|w| used[w.piece]) {
+            let Some(Reckoned { residual, .. }) = self.reckoned(window, at) else {
+                continue;
+            };
+            // A turn's error at its begin is that at the end of the turn before; second differences are all in the frame of the reference.
+            let (shared, at_begin, kept) = match self.up {
+                None => {
+                    let poses = &self.poses.attitude;
+                    let turn = poses[window.from].inverse() * poses[window.to];
+                    (window.to, turn * residual, residual)
+                }
+                Some(_) => (window.middle, residual, residual),
+            };
+            if let Some((pose, before)) = last
+                && pose == window.from
+            {
+                next += before.dot(&at_begin) / 3.0;
+                pairs += 1.0;
+            }
+            last = Some((shared, kept));
+            squares.push(residual.norm_squared() / 3.0);
+        }
+        let mean = squares.iter().sum::<f64>() / squares.len() as f64;
+        let noise = self.noise(mean - next / f64::max(pairs, 1.0));
+        (squares, noise)
     }
 
-    /// Variance of the mean squares by white noise of poses and readings.
-    pub fn noise(&self, model: &Affine<f64>) -> f64 {
-        let (attitude, position) = self.poses.noise();
-        let length = match self.up {
-            None => TURN_S,
-            Some(_) => FORCE_S,
+    /// White noise of the poses, by how much more the residual of a window has in common with itself than with that of the next: errors that last cancel. The noise of a pose
+    /// is in two turns with opposite signs, and in three second differences as 1, -2, 1. That of the readings counts as if it were of the poses: it is small beside theirs, and a
+    /// reading's noise at rest is not known from motion.
+    fn noise(&self, more: f64) -> Noise {
+        let (scale, parts, kept) = match self.up {
+            None => (TURN_S, 3.0, 2.0),
+            Some(_) => (HALF_S.powi(2), 10.0, 6.0),
         };
-        let samples = ((length / self.raw.period).round() as usize).max(1);
-        let own = self.raw.noise_of_means(samples) * model.matrix.norm_squared() / 3.0;
-        let poses = match self.up {
-            None => 2.0 * (attitude / TURN_S).powi(2),
-            Some(_) => 6.0 * (position.unwrap_or(f64::NAN) / HALF_S.powi(2)).powi(2),
-        };
-        own + poses
+        let pose = more.max(0.0) / parts;
+        Noise {
+            variance: kept * pose,
+            pose: pose.sqrt() * scale,
+        }
     }
 
     /// Rms of what is compared, of an axis, SI: the rate of turns, or the specific force.

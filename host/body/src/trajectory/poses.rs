@@ -82,18 +82,6 @@ impl Poses {
         (self.attitude[from].inverse() * self.attitude[to]).scaled_axis()
     }
 
-    /// Standard deviations of the noise of an attitude, rad, and of a position, m, each of an axis: white noise, by the quiet pieces of time.
-    pub fn noise(&self) -> (f64, Option<f64>) {
-        let mut sum = Vector3::zeros();
-        let turned = (0..self.t.len()).map(|k| {
-            sum += self.turn(k.saturating_sub(1), k);
-            sum
-        });
-        let of = |x: Vec<Vector3<f64>>| Series::at_times(&self.t, x).noise().sqrt();
-        let attitude = of(turned.collect());
-        (attitude, self.position.clone().map(of))
-    }
-
     /// By how much the times of raw rates are later than those of the poses, s, to a hundredth of a second or so: where the magnitudes of both agree best.
     pub fn clock(&self, raw: &Series) -> Option<f64> {
         let stride = (GRID_S / median(self.t.windows(2).map(|w| w[1] - w[0]).collect())?)
