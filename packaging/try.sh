@@ -14,18 +14,19 @@ step() { # NAME COMMAND...
     "$@"
     printf '== %s: %d s\n' "$name" $((SECONDS - began))
 }
+# A log as a board writes it: time, specific force, rate.
+{
+    echo time,ax,ay,az,gx,gy,gz
+    paste -d' ' "$example/accel.txt" "$example/gyro.txt" | awk '!/%/ { print $1 "," $2 "," $3 "," $4 "," $6 "," $7 "," $8 }'
+} >log.csv
 first_fit() { # COMMAND
     "$1" --version
-    "$1" fit "$example/accel.txt" "$example/gyro.txt" --raw-unit count --gravity 9.80665 -o cal.toml
+    "$1" fit log.csv --gravity 9.80665 -o cal.toml
     grep -q '^format = "mimu-calibration' cal.toml
     "$1" export c --calibration cal.toml -o calibration.h
 }
 from_python() {
-    "$1" - "$example" <<'PYTHON'
-import sys, numpy, mimu
-accel, gyro = (numpy.loadtxt(f"{sys.argv[1]}/{name}.txt", comments="%") for name in ("accel", "gyro"))
-print(mimu.fit(mimu.Recording(accel[:, 0], gyro[:, 1:], accel[:, 1:], unit="count", gravity=9.80665)))
-PYTHON
+    "$1" -c 'import mimu; print(mimu.fit(mimu.read("log.csv", gravity=9.80665)))'
 }
 page() {
     for name in index.html page.js worker.js mimu.wasm sw.js example/accel.txt; do test -s "$1/$name"; done
