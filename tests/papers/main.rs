@@ -65,8 +65,6 @@ fn run(check: bool, keep_intervals: bool) -> Result<(), Box<dyn std::error::Erro
     }
     let folder = page::docs().join("papers");
     std::fs::create_dir_all(&folder)?;
-    for figure in [xu_table_3::figure()] {
-        figure.draw(&folder)?;
-    }
+    xu_table_3::figure().draw(&folder)?;
     Ok(computed.write()?)
 }
