@@ -11,4 +11,3 @@ fn the_figures_of_the_papers_page_come_out_as_they_stand_there() {
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{said}");
 }
-
