@@ -22,7 +22,7 @@ BUILT := $(or $(CARGO_TARGET_DIR),target)/debug/.tests-built
 # Stages of `make test`; each can be run alone, as in `make clippy`. Tests are linked before they run, so that both times are shown.
 STAGES := fmt clippy rustdoc images no-panic build-tests tests
 
-.PHONY: help data test $(STAGES) run-tests interop python nightly dist book msrv package wheel web web-tests demo example station papers blind clumsy bench budget count device fuzz audit toolchain
+.PHONY: help data test $(STAGES) run-tests interop python nightly dist book site lint msrv package wheel web web-tests demo example station papers blind clumsy bench budget count device fuzz audit toolchain
 
 help: ## this list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' Makefile
@@ -117,6 +117,16 @@ book: toolchain ## the documentation as a site, target/book, with search; its li
 	@test "$$(target/tools/bin/mdbook --version 2>/dev/null)" = "mdbook v$(MDBOOK)" \
 	  || $(CARGO) install --locked --root target/tools --no-default-features --features search --version $(MDBOOK) mdbook
 	RUSTUP_TOOLCHAIN=$(TOOLCHAIN) "$$(RUSTUP_TOOLCHAIN=$(TOOLCHAIN) ./python/environment.sh)/bin/python" docs/book.py target/tools/bin/mdbook target/book
+
+# As the repository's pages have it: the book, the page below page/, and the figures of benchmarks.yml if HISTORY is their file.
+site: book web ## the documentation with the page in it, target/site, as .github/workflows/pages.yml publishes it
+	rm -rf target/site
+	cp -r target/book target/site
+	cp -r target/web target/site/page
+	@if [ -s "$(HISTORY)" ]; then mkdir target/site/benchmarks && python3 packaging/benchmarks.py page "$(HISTORY)" target/site/benchmarks/index.html; fi
+
+lint: ## workflows, forms, citation, recipe, paper: what no test runs
+	./packaging/lint.sh
 
 # The lowest Rust version that builds the crates for PCs, determined by nalgebra. The emulator needs the newest, but only tests need the emulator.
 msrv: ## the command compiles with the lowest Rust version stated in Cargo.toml

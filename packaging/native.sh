@@ -6,7 +6,7 @@ cd "$(dirname "$0")/.."
 target=$1
 version=$(sed -n 's/^version = "\(.*\)"/\1/p' Cargo.toml | head -1)
 name=mimu-$version-$target
-case $target in *windows*) exe=.exe bin=Scripts ;; *) exe= bin=bin ;; esac
+case $target in *windows*) exe=.exe bin=Scripts ;; *) exe='' bin=bin ;; esac
 
 # Tests of boards and of the wizard need pseudo-terminals and the emulator; those of the libraries need neither.
 cargo test --locked -p mimu-core -p mimu-recording -p mimu-allan -p mimu -p mimu-thermal -p mimu-export --lib

@@ -1,2 +1,3 @@
 #!/usr/bin/env bash
+# The archiver of zig, which web/cc.sh compiles with.
 exec "$MIMU_WEB_PYTHON" -m ziglang ar "$@"

@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Tests the exports with their target programs. Usage: run.sh PATH-OF-MIMU [pytest's arguments]
 set -euo pipefail
-export MIMU=$(realpath "$1")
+MIMU=$(realpath "$1")
+export MIMU
 shift
 here=$(cd "$(dirname "$0")" && pwd)
 venv=${CARGO_TARGET_DIR:-$here/../../target}/interop

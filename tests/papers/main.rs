@@ -3,7 +3,6 @@
 //! People write the prose. This program makes the plots and the blocks between markers: `papers` writes them, `papers --check` compares them with the
 //! document. The check omits the intervals, which take longest and have their own tests; `papers --keep-intervals` writes everything else.
 
-mod convergence;
 mod estimators;
 mod fang;
 mod intervals;
@@ -45,7 +44,6 @@ fn run(check: bool, keep_intervals: bool) -> Result<(), Box<dyn std::error::Erro
     let written = Pages::read(&PAGES)?;
     let mut blocks: Vec<page::Block> = fang::blocks()
         .into_iter()
-        .chain(convergence::blocks())
         .chain(xu::blocks())
         .chain(xu_table_3::blocks())
         .chain(niu::blocks())
@@ -67,8 +65,6 @@ fn run(check: bool, keep_intervals: bool) -> Result<(), Box<dyn std::error::Erro
     }
     let folder = page::docs().join("papers");
     std::fs::create_dir_all(&folder)?;
-    for figure in [convergence::figure(), xu_table_3::figure()] {
-        figure.draw(&folder)?;
-    }
+    xu_table_3::figure().draw(&folder)?;
     Ok(computed.write()?)
 }

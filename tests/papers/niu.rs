@@ -1,7 +1,7 @@
 //! niu: consistency of its tables, and curves of the units that are made from them.
 
 use mimu_rig::random::Random;
-use mimu_tests::niu::{SECTION_5_2, TABLE_4, TABLE_6, TABLE_9, TABLE_10, TABLE_11};
+use mimu_tests::niu::{TABLE_9, TABLE_10, TABLE_11};
 use mimu_tests::page::{Block, Table, significant};
 
 /// Drifts over -10 to 70 °C from Tables 5 (MTi-G) and 7 (NV-IMU100); the key is the beginning of the names in Table 9.
@@ -45,22 +45,6 @@ fn moments(course: &[f64]) -> [f64; 2] {
     let n = course.len() as f64;
     let squares = course.iter().map(|x| x * x).sum::<f64>();
     [course.iter().sum::<f64>() / n, (squares / n).sqrt()]
-}
-
-/// Rows of Tables 4 and 6 whose last figure is not the maximum of the others.
-fn maxima() -> Table {
-    let mut table = Table::new(&["table", "row", "maximum, printed", "largest of the row"]);
-    for (name, rows) in [("4", &TABLE_4), ("6", &TABLE_6)] {
-        for (row, figures) in rows {
-            let largest = figures[..5].iter().copied().fold(0.0, f64::max);
-            if largest != figures[5] {
-                let cells = [name.to_string(), (*row).to_string()];
-                let figures = [figures[5], largest].map(|f| format!("{f}"));
-                table.row(cells.into_iter().chain(figures));
-            }
-        }
-    }
-    table
 }
 
 /// Largest drift of the axes by the cubics, against Tables 5 and 7.
@@ -126,37 +110,6 @@ fn powers() -> Table {
         "13 at most".into(),
     ];
     table.row(first.into_iter().chain(printed));
-    table
-}
-
-/// Rows of Tables 10 and 11 whose mean exceeds the root mean square, and differences between section 5.2 and Table 10.
-fn contradictions() -> Table {
-    let mut table = Table::new(&["row", "one figure", "the other"]);
-    for (name, rows) in [("Table 10", &TABLE_10), ("Table 11", &TABLE_11)] {
-        for (row, [rms, mean, rms_before, mean_before]) in rows {
-            for (of, rms, mean) in [
-                ("compensated", rms, mean),
-                ("uncompensated", rms_before, mean_before),
-            ] {
-                if mean.abs() > *rms {
-                    let row = format!("{name}: rms and mean of {row}, {of}");
-                    table.row([row, format!("{rms}"), format!("{mean}")]);
-                }
-            }
-        }
-    }
-    for ((row, [after, _, before, _]), said) in TABLE_10.iter().zip(SECTION_5_2) {
-        for (of, printed, said) in [
-            ("compensated", after, said[0]),
-            ("uncompensated", before, said[1]),
-        ] {
-            // A difference in the last digit is rounding.
-            if (printed - said).abs() > 0.005 * printed {
-                let row = format!("Table 10 and 5.2: rms of {row}, {of}");
-                table.row([row, format!("{printed}"), format!("{said}")]);
-            }
-        }
-    }
     table
 }
 
@@ -272,10 +225,8 @@ fn noise_of_a_scheme() -> Table {
 /// All blocks of this study.
 pub fn blocks() -> Vec<Block> {
     vec![
-        Block::table("niu, maxima", &maxima()),
         Block::table("niu, drifts", &drifts()),
         Block::table("niu, powers of ten", &powers()),
-        Block::table("niu, contradictions", &contradictions()),
         Block::table("niu, directions", &directions()),
         Block::table("niu, noise of a scheme", &noise_of_a_scheme()),
     ]

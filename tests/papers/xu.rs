@@ -193,50 +193,6 @@ impl Experiment {
     }
 }
 
-fn names(letter: &str, offset: &str) -> [String; 12] {
-    std::array::from_fn(|k| match k {
-        0..9 => format!("k_{letter}{}{}", k / 3 + 1, k % 3 + 1),
-        _ => format!("{offset}_{}0", ["x", "y", "z"][k - 9]),
-    })
-}
-
-/// Averages and scatter of the repeats, and the scatter in simulated repeats.
-fn repeats(experiment: &Experiment, names: &[String; 12], unit: &str) -> Table {
-    let ours = simulated(experiment);
-    let heading = format!("scatter of five ({unit} for offsets)");
-    let mut table = Table::new(&["parameter", "average", &heading, "ours, 1000 runs"]);
-    for k in 0..12 {
-        table.row([
-            names[k].clone(),
-            format!("{:.5}", mean(&experiment.table[k])),
-            significant(scatter(&experiment.table[k])),
-            significant(ours[k]),
-        ]);
-    }
-    table
-}
-
-/// Scatter of the twelve parameters about the averages, over the runs, by the paper's estimator.
-fn simulated(experiment: &Experiment) -> [f64; 12] {
-    let (sigma, rest) = experiment.noise();
-    let mut squares = [0.0; 12];
-    for run in 0..RUNS {
-        let mut random = Random::new(run, "xu repeats");
-        let unit = experiment.of_the_day(&rest, &mut random);
-        let dwells = experiment.dwells(&unit, sigma, &mut random);
-        let found = (experiment.estimator)(&dwells);
-        for (k, square) in squares.iter_mut().enumerate() {
-            let value = if k < 9 {
-                found.matrix[(k / 3, k % 3)]
-            } else {
-                found.offset[k - 9]
-            };
-            *square += (value - mean(&experiment.table[k])).powi(2) / RUNS as f64;
-        }
-    }
-    squares.map(f64::sqrt)
-}
-
 /// Errors of the estimators against the unit of the day: rms over all elements of C and over o.
 fn estimators(experiments: [&Experiment; 2]) -> Table {
     let mut table = Table::new(&[
@@ -293,11 +249,6 @@ pub fn blocks() -> Vec<Block> {
         attenuation(&a)
     );
     vec![
-        block("xu, gyro repeats", repeats(&g, &names("g", "ω"), "deg/s")),
-        block(
-            "xu, accelerometer repeats",
-            repeats(&a, &names("a", "f"), "as printed"),
-        ),
         Block {
             name: "xu, noise",
             text: Some(facts),

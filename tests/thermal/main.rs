@@ -9,7 +9,6 @@
 //! | `fang [RUNS]` | fang's soak, with and without misalignments |
 //! | `compensation` | niu's six tests of compensation, by the device's arithmetic |
 //! | `sweep [RUNS]` | poses spread over the sphere while the temperature goes up and down, with the default unit |
-//! | `repeatability` | niu's three ramps against his soak both ways |
 //! | `planned [RUNS]` | what `mimu thermal plan --procedure ramp` promises |
 //! | `write [COMMAND ...]` | these tables, or all, into the pages, each with the number of runs of the pages |
 
@@ -20,7 +19,6 @@ mod fang;
 mod on_bench;
 mod planned;
 mod points;
-mod repeatability;
 mod side_by_side;
 mod simulation;
 mod soak;
@@ -48,7 +46,7 @@ struct Study {
     blocks: fn(u64) -> Vec<Block>,
 }
 
-const STUDIES: [Study; 7] = [
+const STUDIES: [Study; 6] = [
     Study {
         command: "dies",
         runs: 200,
@@ -84,12 +82,6 @@ const STUDIES: [Study; 7] = [
         runs: 8,
         names: &planned::NAMES,
         blocks: planned::blocks,
-    },
-    Study {
-        command: "repeatability",
-        runs: 1,
-        names: &repeatability::NAMES,
-        blocks: repeatability::blocks,
     },
 ];
 

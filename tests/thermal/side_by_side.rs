@@ -35,9 +35,8 @@ const ON_SOAK: [Row; 2] = [
     ("each plateau", Estimator::Classic(Classic::Soak)),
     ("`mimu thermal fit`", joint(Shape::Spline, None)),
 ];
-const ON_RAMP: [Row; 4] = [
+const ON_RAMP: [Row; 3] = [
     ("`mimu thermal fit`", joint(Shape::Spline, None)),
-    ("the same, `--lag 0`", joint(Shape::Spline, Some(0.0))),
     ("the same with cubics", joint(Shape::Cubic, None)),
     ("niu's", Estimator::Classic(Classic::RampNiu)),
 ];
