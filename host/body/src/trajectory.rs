@@ -117,7 +117,7 @@ impl Found {
         errors.held_out_rms *= solution.unseen(&used);
         Some(Self {
             errors,
-            left_out: compared.pieces.spans(&used),
+            left_out: compared.left_out(&at, &used),
             signal: compared.signal(),
             pose_noise: noise.pose,
             at,
@@ -157,6 +157,10 @@ impl Turns {
     fn of(trajectory: &Trajectory, raw: &Series) -> Result<Self> {
         let as_read = Poses::of(trajectory, false);
         let refused = |problem: &str, remedy: &str| Error::new(&trajectory.place, problem, remedy);
+        if let Some(between) = as_read.is_sparse() {
+            let problem = format!("its poses are {between:.2} s apart");
+            return Err(refused(&problem, "record ten poses a second, better a hundred"));
+        }
         let delay = as_read.clock(raw).ok_or_else(|| {
             refused(
                 "its turns are not those of the recording, whatever their clocks differ by up to 30 s",
@@ -353,7 +357,7 @@ impl ByTrajectory {
         }
     }
 
-    /// The tables of a calibration file. A misfit is left out.
+    /// The tables of a calibration file.
     pub fn tables(&self, raw: RawUnit) -> PerSensor<Option<TriadTable>> {
         let has_accel = self
             .body
@@ -366,7 +370,6 @@ impl ByTrajectory {
                 .triads
                 .iter()
                 .find(|of| of.name == first(sensor))?;
-            of.judgement.needs_consent().is_none().then_some(())?;
             let frame = match has_accel {
                 true => "body: x along the accelerometer's x, xy plane through its y",
                 false => "body: x along the gyro's x, xy plane through its y",

@@ -12,6 +12,11 @@ const APART_S: f64 = 0.2;
 const GRID_S: f64 = 0.02;
 const SEARCHED_S: f64 = 30.0;
 
+/// Correlation of the magnitudes of rates beyond which both are of one motion. Trials of one person alike reach 0.6.
+const LIKE: f64 = 0.8;
+/// Longest usual time between poses, s.
+const SPARSE_S: f64 = 0.1;
+
 /// Attitude (body to reference) and position, m, over time, s.
 pub(super) struct Poses {
     pub t: Vec<f64>,
@@ -34,6 +39,12 @@ impl Poses {
                 .has_positions()
                 .then(|| poses.iter().map(|pose| pose.position).collect()),
         }
+    }
+
+    /// Usual time between poses, s, if that is too long for what happens between.
+    pub fn is_sparse(&self) -> Option<f64> {
+        let between = median(self.t.windows(2).map(|w| w[1] - w[0]).collect())?;
+        (between > SPARSE_S).then_some(between)
     }
 
     /// The pose next to a time.
@@ -107,7 +118,7 @@ impl Poses {
         };
         let lags = (-steps..=steps).map(|k| f64::from(k) * GRID_S);
         let best = lags.max_by(|a, b| likeness(*a).total_cmp(&likeness(*b)))?;
-        (likeness(best) > 0.5).then_some(best)
+        (likeness(best) > LIKE).then_some(best)
     }
 }
 

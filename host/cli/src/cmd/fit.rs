@@ -421,7 +421,7 @@ fn beside(args: &FitArgs, by: &Trajectory) -> Result<Status> {
     inputs.extend(args.trajectory.trajectory.as_deref());
     check_outputs(&[args.output.as_deref(), args.json.file()], &inputs)?;
     let made = trajectory::fitted(&recording, by)?;
-    let calibration = || Ok(made.calibration.clone());
+    let calibration = || made.calibration(&recording);
     write(
         args,
         made.text,

@@ -48,7 +48,19 @@ pub(crate) struct Made {
     pub text: String,
     pub json: Value,
     pub judgement: Judgement,
-    pub calibration: Calibration,
+    found: ByTrajectory,
+}
+
+impl Made {
+    /// The calibration of `recording`.
+    ///
+    /// # Errors
+    /// No triad is determined.
+    pub fn calibration(&self, recording: &Recording) -> Result<Calibration> {
+        let manifest = &recording.manifest;
+        let tables = self.found.tables(manifest.raw_unit);
+        Calibration::of_body(manifest, tables, Vec::new(), self.judgement.clone(), &now())
+    }
 }
 
 /// Calibrates `recording` by `by`.
@@ -69,14 +81,11 @@ pub(crate) fn fitted(recording: &Recording, by: &Trajectory) -> Result<Made> {
         "raw_unit": raw,
         "trajectory": instrument,
     });
-    let tables = found.tables(raw);
-    let calibration =
-        Calibration::of_body(manifest, tables, Vec::new(), judgement.clone(), &now())?;
     Ok(Made {
         text: report::trajectory_text(&recording.place, &of, &instrument, &judgement),
         json: report::with_sensors(&head, &of),
         judgement,
-        calibration,
+        found,
     })
 }
 
