@@ -159,7 +159,10 @@ impl Turns {
         let refused = |problem: &str, remedy: &str| Error::new(&trajectory.place, problem, remedy);
         if let Some(between) = as_read.is_sparse() {
             let problem = format!("its poses are {between:.2} s apart");
-            return Err(refused(&problem, "record ten poses a second, better a hundred"));
+            return Err(refused(
+                &problem,
+                "record ten poses a second, better a hundred",
+            ));
         }
         let delay = as_read.clock(raw).ok_or_else(|| {
             refused(

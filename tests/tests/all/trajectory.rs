@@ -1,11 +1,12 @@
 //! Units beside a trajectory that was computed from the same curves as their readings.
 
+use mimu::in_use::{Pose, Trajectory};
 use mimu::quantity::Sensor;
 use mimu::triad::Angles;
 use mimu_body::ByTrajectory;
 use mimu_rig::random::Random;
 use mimu_tests::flight::Flight;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 /// A flight of a unit with errors of a percent, mounted and timed anyhow.
 fn flight(seed: u64) -> Flight {
@@ -106,4 +107,52 @@ fn a_unit_by_a_trajectory_is_what_it_is_within_its_intervals() {
     }
     let share = inside as f64 / all as f64;
     assert!((0.9..=0.99).contains(&share), "{share}");
+}
+
+/// The poses of `trajectory` as another instrument would write them.
+fn written(trajectory: &Trajectory, each: impl Fn(&Pose) -> Pose) -> Trajectory {
+    let rows = trajectory.poses().iter().map(|pose| {
+        let Pose {
+            t_s,
+            attitude: q,
+            position: p,
+        } = each(pose);
+        format!(
+            "{t_s} {} {} {} {} {} {} {}",
+            p.x, p.y, p.z, q.i, q.j, q.k, q.w
+        )
+    });
+    Trajectory::parse(&rows.collect::<Vec<_>>().join("\n"), "written").unwrap()
+}
+
+#[test]
+fn reversed_quaternions_and_another_axis_up_give_the_same_and_another_motion_is_refused() {
+    let (recording, trajectory) = flight(1).flown(1);
+    let scale = |trajectory: &Trajectory| {
+        let found = ByTrajectory::of(&recording, trajectory).unwrap();
+        let of = &found.body.triads[1].triad;
+        (of.physical(Angles::Exact).scale[0].value, found)
+    };
+    let (expected, _) = scale(&trajectory);
+    let (reversed, found) = scale(&written(&trajectory, |pose| Pose {
+        attitude: pose.attitude.inverse(),
+        ..*pose
+    }));
+    assert!(
+        found.reversed && (reversed - expected).abs() < 1e-6,
+        "{reversed}"
+    );
+    let level = UnitQuaternion::from_scaled_axis(-Vector3::x() * std::f64::consts::FRAC_PI_2);
+    let (turned, found) = scale(&written(&trajectory, |pose| Pose {
+        t_s: pose.t_s + 5.0,
+        attitude: level * pose.attitude,
+        position: level * pose.position,
+    }));
+    assert_eq!(found.up, Some("y"));
+    assert!((turned - expected).abs() < 1e-6, "{turned} {expected}");
+    let (_, other) = flight(2).flown(2);
+    let refused = ByTrajectory::of(&recording, &other)
+        .unwrap_err()
+        .to_string();
+    assert!(refused.contains("not those of the recording"), "{refused}");
 }

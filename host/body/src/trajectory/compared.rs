@@ -537,7 +537,9 @@ impl<'a> Compared<'a> {
     /// Times of the pieces that are not used, by the clock of the recording, s.
     pub fn left_out(&self, at: &DVector<f64>, used: &[bool]) -> Vec<[f64; 2]> {
         let spans = self.pieces.spans(used).into_iter();
-        spans.map(|span| span.map(|t| t + self.lag(at, t))).collect()
+        spans
+            .map(|span| span.map(|t| t + self.lag(at, t)))
+            .collect()
     }
 
     /// Rms of what is compared, of an axis, SI: the rate of turns, or the specific force.

@@ -424,7 +424,7 @@ fn beside(args: &FitArgs, by: &Trajectory) -> Result<Status> {
     let calibration = || made.calibration(&recording);
     write(
         args,
-        made.text,
+        made.text.clone(),
         &made.json,
         &made.judgement,
         &recording.place,
