@@ -32,8 +32,6 @@ mod terminal;
 mod thermal;
 mod thermal_plan;
 pub(crate) mod thermal_plot;
-#[cfg(not(target_family = "wasm"))]
-mod thermal_record;
 mod unit;
 mod verify;
 mod wizard;
@@ -61,8 +59,6 @@ pub(crate) use refusal::{print_refusal, refused};
 pub use sessions::sessions_text;
 pub use thermal::{thermal_page, thermal_text};
 pub use thermal_plan::thermal_plan_text;
-#[cfg(not(target_family = "wasm"))]
-pub(crate) use thermal_record::{thermal_progress, thermal_record_text};
 pub use unit::{UnitReport, trace_figure, unit_page};
 pub use verify::verify_text;
 pub use wizard::{wizard_lines, wizard_text};

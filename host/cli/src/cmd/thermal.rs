@@ -1,8 +1,6 @@
 //! `mimu thermal`.
 
 mod plan;
-#[cfg(not(target_family = "wasm"))]
-mod record;
 
 use std::path::PathBuf;
 
@@ -37,9 +35,6 @@ enum ThermalCommand {
     Fit(Box<FitArgs>),
     /// Plan a procedure; prints its duration and the expected uncertainty of the curves
     Plan(plan::PlanArgs),
-    #[cfg(not(target_family = "wasm"))]
-    /// Carry out a plan: set the chamber, move the table, and record the device
-    Record(record::RecordArgs),
 }
 
 /// Arguments of `mimu thermal fit`.
@@ -121,8 +116,6 @@ pub(crate) fn run(args: &ThermalArgs, command_line: &str) -> Result<Status> {
     match &args.command {
         ThermalCommand::Fit(args) => run_fit(args, command_line),
         ThermalCommand::Plan(args) => plan::run(args).map(done),
-        #[cfg(not(target_family = "wasm"))]
-        ThermalCommand::Record(args) => record::run(args).map(done),
     }
 }
 

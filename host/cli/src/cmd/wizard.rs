@@ -364,7 +364,7 @@ fn planned(plan: &Plan, fixture: Fixture, gravity_mps2: f64, path: &Path) -> Res
         if dwell.turn.is_some() {
             let at = format!("{place}, dwell {k}");
             let problem = "it is a turn by an angle; the wizard makes dwells only";
-            let remedy = "carry it out with `mimu thermal record`, or give another plan";
+            let remedy = "record it with `mimu record --plan` and --steps, or give another plan";
             return Err(Error::new(at, problem, remedy));
         }
         if dwell.rate_dps != 0.0 && fixture != Fixture::Table {

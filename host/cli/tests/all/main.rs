@@ -25,5 +25,4 @@ mod random;
 mod readme;
 mod thermal_command;
 mod thermal_plan_command;
-mod thermal_record_command;
 mod wizard;

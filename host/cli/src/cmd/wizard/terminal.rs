@@ -113,11 +113,11 @@ pub(crate) fn run(args: &WizardArgs, command_line: &str) -> Result<()> {
     let wanted = args.wanted()?;
     let driver: Box<dyn Driver> = match args.drivers.as_slice() {
         [] => Box::new(Person),
-        [path] => Box::new(TextDriver::open_table(path)?),
+        [path] => Box::new(TextDriver::open(path)?),
         paths => {
-            let each = paths.iter().map(|path| -> Result<Box<dyn Driver>> {
-                Ok(Box::new(TextDriver::open_table(path)?))
-            });
+            let each = paths
+                .iter()
+                .map(|path| -> Result<Box<dyn Driver>> { Ok(Box::new(TextDriver::open(path)?)) });
             Box::new(Together(each.collect::<Result<_>>()?))
         }
     };
