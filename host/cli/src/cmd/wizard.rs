@@ -105,9 +105,6 @@ pub(crate) struct WizardArgs {
     /// Write the events as JSON lines (`-`: to standard output)
     #[arg(long, value_name = "FILE")]
     events: Option<PathBuf>,
-    /// Write lines of text even on a terminal that is large enough for the full screen (80 x 24)
-    #[arg(long)]
-    plain: bool,
     #[command(flatten)]
     json: JsonArgs,
 }
@@ -419,7 +416,6 @@ pub(crate) fn session(
         ("--driver", !args.drivers.is_empty()),
         ("--events", args.events.is_some()),
         ("--json", args.json.is_given()),
-        ("--plain", args.plain),
         ("--yes", args.yes),
     ];
     let by_hand = args.fixture.fixture() != Fixture::Table;
