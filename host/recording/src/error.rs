@@ -107,7 +107,6 @@ arguments! {
     Seed, "--seed", "Order of the planned dwells.";
     Drift, "--drift", "Largest change of temperature during a session.";
     Prior, "--prior", "The population that a unit is from.";
-    EstimatedBy, "--by", "Whether the PC or the device estimates the calibration.";
     Output, "-o", "Folder that is written.";
     CalibrationOfNoise, "mimu allan --calibration", "The calibration that a noise file is made with.";
     Noise, "--noise", "Noise of the unit.";
