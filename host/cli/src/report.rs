@@ -12,7 +12,6 @@ pub mod allan_plot;
 mod apply;
 mod body;
 pub(crate) mod budget;
-mod certificate;
 mod compare;
 pub(crate) mod data_sheet;
 mod design;
@@ -41,7 +40,6 @@ pub use accept::{accept_line, accept_text};
 pub use allan::allan_text;
 pub use apply::apply_text;
 pub(crate) use body::{body_errors_text, body_text, split_text, with_sensors};
-pub use certificate::certificate_page;
 pub use compare::compare_text;
 pub use design::{design_text, next_text};
 pub use device::{

@@ -5,7 +5,6 @@ mod allan_command;
 mod bad_input;
 mod biases_at_rest;
 mod body_command;
-mod certificate;
 mod command;
 mod design_command;
 mod design_with_a_prior;

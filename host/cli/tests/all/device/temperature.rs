@@ -7,7 +7,7 @@ use mimu_rig::rig_file::{RigFile, RigTruth};
 use nalgebra::{Matrix3, Vector3};
 
 use super::Place;
-use super::board::{AT_REST, Bench};
+use super::board::{AT_REST, Bench, forward};
 use super::calibration::{Forward, text_of};
 
 /// Drifts of the gyros' biases, deg/s per °C, and their curvature, 1/°C.
