@@ -10,7 +10,6 @@
 //! | `compensation` | niu's six tests of compensation, by the device's arithmetic |
 //! | `sweep [RUNS]` | poses spread over the sphere while the temperature goes up and down, with the default unit |
 //! | `repeatability` | niu's three ramps against his soak both ways |
-//! | `planned [RUNS]` | what `mimu thermal plan --procedure ramp` promises |
 //! | `write [COMMAND ...]` | these tables, or all, into the pages, each with the number of runs of the pages |
 
 mod classic;
@@ -18,7 +17,6 @@ mod compensation;
 mod dies;
 mod fang;
 mod on_bench;
-mod planned;
 mod points;
 mod repeatability;
 mod side_by_side;
@@ -32,11 +30,7 @@ use std::process::ExitCode;
 use mimu_tests::page::{Block, Pages};
 
 /// The pages with places for tables.
-const PAGES: [&str; 3] = [
-    "thermal/measured.md",
-    "thermal/papers.md",
-    "thermal/planning.md",
-];
+const PAGES: [&str; 2] = ["thermal/measured.md", "thermal/papers.md"];
 
 /// A command that computes tables.
 struct Study {
@@ -48,7 +42,7 @@ struct Study {
     blocks: fn(u64) -> Vec<Block>,
 }
 
-const STUDIES: [Study; 7] = [
+const STUDIES: [Study; 6] = [
     Study {
         command: "dies",
         runs: 200,
@@ -78,12 +72,6 @@ const STUDIES: [Study; 7] = [
         runs: 20,
         names: &sweep::NAMES,
         blocks: sweep::blocks,
-    },
-    Study {
-        command: "planned",
-        runs: 8,
-        names: &planned::NAMES,
-        blocks: planned::blocks,
     },
     Study {
         command: "repeatability",

@@ -3,14 +3,11 @@
 //! Every recording is another power-on of the same unit. Once the unit has only the noise of niu's Table 3, once also what his units surely had and
 //! he does not give: instability, scatter from power-on to power-on, hysteresis. Their sizes are assumed.
 
-use mimu::plan::design::budget::DwellNoise;
 use mimu::quantity::Sensor;
 use mimu_rig::random::Random;
 use mimu_rig::rig_file::RigFile;
 use mimu_tests::niu::{Row, TABLE_4, TABLE_6};
 use mimu_tests::page::{Block, Table, significant};
-use mimu_thermal::basis::Shape;
-use mimu_thermal::plan::{Procedure, Request, plan, to_toml};
 use nalgebra::SVector;
 use rayon::prelude::*;
 
@@ -25,17 +22,13 @@ const TEMPS_C: [f64; 5] = [-10.0, 10.0, 30.0, 50.0, 70.0];
 const DEG_PER_H: f64 = std::f64::consts::PI / 180.0 / 3600.0;
 const MG: f64 = 9.80665e-3;
 
-/// Chamber profiles of Table 2: °C and minutes held.
-const PROFILES: [&[[f64; 2]]; 3] = [
-    &[[25.0, 0.0], [-35.0, 30.0], [75.0, 60.0], [-35.0, 30.0]],
-    &[[25.0, 0.0], [75.0, 30.0], [-35.0, 30.0], [75.0, 30.0]],
-    &[
-        [25.0, 0.0],
-        [75.0, 40.0],
-        [25.0, 20.0],
-        [-35.0, 30.0],
-        [25.0, 30.0],
-    ],
+/// Table 2's soak, eleven set points of an hour each, heating and cooling; and niu's scheme of 152 s while the chamber follows one of his three profiles at
+/// 2 K/min.
+const PLANS: [&str; 4] = [
+    include_str!("plans/soak.toml"),
+    include_str!("plans/profile-1.toml"),
+    include_str!("plans/profile-2.toml"),
+    include_str!("plans/profile-3.toml"),
 ];
 
 /// Assumed sizes of what is not in niu's tables, of gyro (deg/h) and accelerometer (mg).
@@ -169,13 +162,11 @@ pub fn blocks(_: u64) -> Vec<Block> {
 
 /// Estimates of the soak, each plateau fitted, and of the three ramps, by niu's own computation.
 fn recorded(file: &RigFile, unstable: Option<&Unstable>) -> (Curves, Vec<Curves>) {
-    let each = (0..=PROFILES.len()).into_par_iter().map(|k| {
-        let (request, classic) = match k.checked_sub(1) {
-            None => (soak(), Classic::Soak),
-            Some(profile) => (ramp(PROFILES[profile]), Classic::RampNiu),
+    let each = PLANS.into_par_iter().enumerate().map(|(k, text)| {
+        let classic = match k {
+            0 => Classic::Soak,
+            _ => Classic::RampNiu,
         };
-        let planned = plan(&request).expect("a plan");
-        let text = to_toml(&planned, request.sample_rate_hz);
         // niu takes the Earth's rate out, by (a.7) and (a.8).
         let key = "\nsample_rate_hz";
         let text = text.replacen(key, &format!("\nlatitude_deg = 30.5{key}"), 1);
@@ -244,35 +235,4 @@ fn gain(file: &RigFile, sensor: usize) -> f64 {
 /// `model` of each sensor at each temperature, relative to the gain and without the nominal matrix and bias.
 fn curves(file: &RigFile, model: impl Fn(usize, f64) -> SVector<f64, 12>) -> Curves {
     [0, 1].map(|sensor| TEMPS_C.map(|t| model(sensor, t) / gain(file, sensor)))
-}
-
-/// Table 2's soak: eleven set points, an hour each, heating and cooling.
-fn soak() -> Request {
-    Request {
-        procedure: Procedure::Soak,
-        range_c: [-30.0, 70.0],
-        set_points: 11,
-        both_ways: true,
-        soak_s: 3600.0,
-        dwell_s: 20.0,
-        ..ramp(&[])
-    }
-}
-
-/// niu's scheme of 152 s while the chamber follows `profile` at 2 K/min.
-fn ramp(profile: &[[f64; 2]]) -> Request {
-    Request {
-        procedure: Procedure::Niu,
-        range_c: [-35.0, 75.0],
-        shape: Shape::Cubic,
-        kelvin_per_min: 2.0,
-        set_points: 9,
-        both_ways: false,
-        course: profile.iter().map(|[c, min]| [*c, 60.0 * min]).collect(),
-        soak_s: 1800.0,
-        dwell_s: 9.0,
-        largest_dps: 50.0,
-        sample_rate_hz: 100.0,
-        noise: Sensor::BOTH.map(DwellNoise::fang),
-    }
 }

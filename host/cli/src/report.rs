@@ -29,7 +29,6 @@ mod svg;
 mod table;
 mod terminal;
 mod thermal;
-mod thermal_plan;
 pub(crate) mod thermal_plot;
 mod unit;
 mod verify;
@@ -43,8 +42,8 @@ pub(crate) use body::{body_errors_text, body_text, split_text, with_sensors};
 pub use compare::compare_text;
 pub use design::{design_text, next_text};
 pub use device::{
-    check_text, counters_text, download_text, info_text, record_text, self_test_text,
-    stream_text, upload_text,
+    check_text, counters_text, download_text, info_text, record_text, self_test_text, stream_text,
+    upload_text,
 };
 pub use diagnosis::{Detail, diagnosis_page, diagnosis_text, not_in_plan_text};
 pub use fit::{dwell_table, fit_text};
@@ -56,7 +55,6 @@ pub(crate) use page::problems_text;
 pub(crate) use refusal::{print_refusal, refused};
 pub use sessions::sessions_text;
 pub use thermal::{thermal_page, thermal_text};
-pub use thermal_plan::thermal_plan_text;
 pub use unit::{UnitReport, trace_figure, unit_page};
 pub use verify::verify_text;
 pub use wizard::{wizard_lines, wizard_text};

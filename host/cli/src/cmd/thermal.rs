@@ -1,7 +1,5 @@
 //! `mimu thermal`.
 
-mod plan;
-
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
@@ -33,8 +31,6 @@ pub(crate) struct ThermalArgs {
 enum ThermalCommand {
     /// Estimate all parameters over temperature, and the lag of the dies behind the thermometer
     Fit(Box<FitArgs>),
-    /// Plan a procedure; prints its duration and the expected uncertainty of the curves
-    Plan(plan::PlanArgs),
 }
 
 /// Arguments of `mimu thermal fit`.
@@ -112,11 +108,8 @@ const MISFIT: &str =
     "look for jumps and moves in the plot and leave those parts out, or write it all the same";
 
 pub(crate) fn run(args: &ThermalArgs, command_line: &str) -> Result<Status> {
-    let done = |()| Status::Done;
-    match &args.command {
-        ThermalCommand::Fit(args) => run_fit(args, command_line),
-        ThermalCommand::Plan(args) => plan::run(args).map(done),
-    }
+    let ThermalCommand::Fit(args) = &args.command;
+    run_fit(args, command_line)
 }
 
 fn run_fit(args: &FitArgs, command_line: &str) -> Result<Status> {

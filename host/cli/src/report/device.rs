@@ -5,12 +5,11 @@ use mimu::quantity::{AXES, Sensor, plural, significant};
 use mimu::readable::STANDARD_GRAVITY;
 use mimu_device::record::RecordSummary;
 use mimu_device::{
-    Checked, Contents, Counted, DeviceResult, Identity, LineCount, SelfTested, Streamed,
-    Uploaded, Verdict,
+    Checked, Contents, Counted, DeviceResult, Identity, LineCount, SelfTested, Streamed, Uploaded,
+    Verdict,
 };
 
 use super::page::all_warnings;
-use super::table::{number, table};
 use super::terminal::text;
 
 /// Result of `mimu device info`.

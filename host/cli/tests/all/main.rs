@@ -23,5 +23,4 @@ mod pocket_calculator;
 mod random;
 mod readme;
 mod thermal_command;
-mod thermal_plan_command;
 mod wizard;
