@@ -53,7 +53,7 @@ class Socket:
 def wizard(port, folder, until=None):
     """Runs `mimu wizard` at `port`, to its end or until `until(events)`; returns its output."""
     events = folder.parent / "events.jsonl"
-    command = [os.environ["MIMU"], "wizard", "-o", str(folder), "--port", port, *SESSION, "--events", str(events), "--plain"]
+    command = [os.environ["MIMU"], "wizard", "-o", str(folder), "--port", port, *SESSION, "--events", str(events)]
     running = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     if until is not None:
         while running.poll() is None:

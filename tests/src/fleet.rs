@@ -150,8 +150,7 @@ pub fn prior(units: u64) -> Arc<Prior> {
         measurements,
         ..Tree::default()
     };
-    let (_, prior) =
-        mimu_fleet::fleet_and_prior(tree, None, &mimu_fleet::Options::default()).expect("a fleet");
+    let (_, prior) = mimu_fleet::fleet_and_prior(tree, None).expect("a fleet");
     Arc::new(Prior::parse(&prior.to_toml(), "prior.toml").expect("it reads what it writes"))
 }
 

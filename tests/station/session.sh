@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# A session of a station with simulated boards: the golden unit, four boards at once, three sides of one, and one that comes back for re-calibration. Usage:
+# A session of a station with simulated boards: four boards at once, three sides of one, and one that comes back for re-calibration. Usage:
 # session.sh PATH-OF-MIMU PATH-OF-MIMU-RIG
 set -euo pipefail
 mimu=$(realpath "$1")
@@ -48,7 +48,6 @@ show() {
     printf '(exit status %s)\n' "$status"
 }
 
-for k in 1 2 3 4 5 6 7; do unit golden "$k" 0.40 1 "golden-$k" 0,0,1; done
 unit A-1041 11 0.35 1 A-1041 0,0,1
 unit A-1042 12 2.60 1 A-1042 0,0,1
 unit A-1043 13 -0.10 1 A-1043.good 0,0,1
@@ -82,11 +81,9 @@ python3 "$here/boards.py" 7701=A-1041 7702=A-1042 7703=A-1043 7704=A-1044 >ready
 boards=$!
 while ! grep -q ready ready; do sleep 0.1; done
 
-show accept golden-1 golden-2 golden-3 golden-4 golden-5 --limits limits.toml --golden golden.json --new-golden
-show accept golden-6 --limits limits.toml --golden golden.json
 show accept --port tcp://127.0.0.1:7701 --port tcp://127.0.0.1:7702 --port tcp://127.0.0.1:7703 --port tcp://127.0.0.1:7704 \
-    --text t_us,ax,ay,az,gx,gy,gz,temp_c --unit A-1041 --unit A-1042 --unit A-1043 --unit A-1044 --for 10s --latitude 48.1 --limits limits.toml --golden golden.json -o results
-show accept x-up y-up z-up --faces --limits limits.toml --golden golden.json
+    --text t_us,ax,ay,az,gx,gy,gz,temp_c --unit A-1041 --unit A-1042 --unit A-1043 --unit A-1044 --for 10s --latitude 48.1 --limits limits.toml -o results
+show accept x-up y-up z-up --faces --limits limits.toml
 # A unit that comes back after a year: calibrated by hand then and now, and measured at rest now.
 root=$here/../..
 "$rig" record "$root/rig/plans/hands.toml" --rig "$root/rig/rigs/sessions.toml" --seed 31 -o then >/dev/null

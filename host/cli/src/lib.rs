@@ -65,7 +65,7 @@ enum Command {
     Apply(apply::ApplyArgs),
     /// Show what changed between calibrations of one unit by more than their intervals
     Compare(cmd::compare::CompareArgs),
-    /// Show what the calibrations of many units say together: population, units that do not belong, drift, Gage R&R, Cpk
+    /// Show what the calibrations of many units say together: population, units that do not belong, drift, Cpk
     Fleet(cmd::fleet::FleetArgs),
     /// Find the effect that causes the residual of a calibrated unit
     Diagnose(diagnose::DiagnoseArgs),
@@ -88,7 +88,7 @@ enum Command {
     /// Record the raw stream of a device
     Record(record::RecordArgs),
     #[cfg(not(target_family = "wasm"))]
-    /// Control a device: info, stream, upload, download, trim, self-test, counters, check, kalman
+    /// Control a device: info, stream, upload, download, self-test, counters, check
     Device(device::DeviceArgs),
     /// Print the completion script of a shell
     Completions(cmd::completions::CompletionsArgs),

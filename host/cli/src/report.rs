@@ -12,7 +12,6 @@ pub mod allan_plot;
 mod apply;
 mod body;
 pub(crate) mod budget;
-mod certificate;
 mod compare;
 pub(crate) mod data_sheet;
 mod design;
@@ -30,10 +29,7 @@ mod svg;
 mod table;
 mod terminal;
 mod thermal;
-mod thermal_plan;
 pub(crate) mod thermal_plot;
-#[cfg(not(target_family = "wasm"))]
-mod thermal_record;
 mod trajectory;
 mod unit;
 mod verify;
@@ -44,12 +40,11 @@ pub use accept::{accept_line, accept_text};
 pub use allan::allan_text;
 pub use apply::apply_text;
 pub(crate) use body::{body_errors_text, body_text, split_text, with_sensors};
-pub use certificate::certificate_page;
 pub use compare::compare_text;
 pub use design::{design_text, next_text};
 pub use device::{
-    check_text, counters_text, download_text, info_text, kalman_text, record_text, self_test_text,
-    stream_text, trim_text, upload_text,
+    check_text, counters_text, download_text, info_text, record_text, self_test_text, stream_text,
+    upload_text,
 };
 pub use diagnosis::{Detail, diagnosis_page, diagnosis_text, not_in_plan_text};
 pub use fit::{dwell_table, fit_text};
@@ -61,9 +56,6 @@ pub(crate) use page::problems_text;
 pub(crate) use refusal::{print_refusal, refused};
 pub use sessions::sessions_text;
 pub use thermal::{thermal_page, thermal_text};
-pub use thermal_plan::thermal_plan_text;
-#[cfg(not(target_family = "wasm"))]
-pub(crate) use thermal_record::{thermal_progress, thermal_record_text};
 pub(crate) use trajectory::trajectory_text;
 pub use unit::{UnitReport, trace_figure, unit_page};
 pub use verify::verify_text;

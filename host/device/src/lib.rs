@@ -10,7 +10,6 @@
 //! | `origin`          | the unit, the date and the recording of a calibration                    |
 //! | `upload`          | sends a calibration and reads it back                                    |
 //! | `contents`        | contents of stored calibrations                                          |
-//! | `trim`            | corrects the offsets of the stored calibration while the unit is at rest |
 //! | `test_result`     | a row of the self-test                                                   |
 //! | `self_test`       | the self-test, and whether the unit was at rest during it                |
 //! | `flagged`         | counts samples that carry a flag                                         |
@@ -19,14 +18,12 @@
 //! | `reading`         | single-precision readings as short decimal numbers                       |
 //! | [`record`]        | records the raw stream                                                   |
 //! | `result`          | a command's result with port and command, as written in JSON             |
-//! | `kalman`          | compares the device's Kalman bank with the PC's on the same samples      |
 
 mod check;
 mod contents;
 mod flagged;
 mod identity;
 mod image;
-mod kalman;
 mod line;
 mod origin;
 mod port;
@@ -38,7 +35,6 @@ mod self_test;
 mod session;
 mod stream;
 mod test_result;
-mod trim;
 mod upload;
 
 pub use check::{Checked, Difference, check, rounding, ulps};
@@ -46,7 +42,6 @@ pub use contents::{Contents, Inverse, NodeContents, calibration, contents};
 pub use flagged::Flagged;
 pub use identity::{Hash, Identity, Room, Started, StoredCalibration, TriadInfo, unit_name};
 pub use image::Image;
-pub use kalman::{Applied, AxisEstimate, Converging, KalmanPlan, KalmanRun, SHORTEST, kalman};
 pub use port::{BAUD, Port, Ports, SerialPair, ports, serial_pair};
 pub use received::{Answer, Event, LineCount, Received, Receiver, Samples};
 pub use result::{Counted, DeviceResult};
@@ -54,5 +49,4 @@ pub use self_test::{SelfTested, self_test};
 pub use session::{Session, refused};
 pub use stream::{Moments, Stream, Streamed, Thermometer, look, stream};
 pub use test_result::{TestResult, Verdict};
-pub use trim::{Pose, SHORTEST_TRIM_S, Trimmed, TrimmedTriad, trim};
 pub use upload::{Uploaded, download, outside_now, upload};

@@ -139,11 +139,3 @@ fn index(row: &Row, values: &[(f64, Option<f64>)]) -> Option<Capability> {
         beyond: values.iter().filter(|v| v.0.abs() > row.at_most).count(),
     })
 }
-
-/// Width of the tolerance of a property.
-pub fn tolerance(row: &Row) -> f64 {
-    match is_two_sided(row.property) {
-        true => 2.0 * row.at_most,
-        false => row.at_most,
-    }
-}

@@ -19,7 +19,6 @@ use crate::prior;
 use crate::remeasured::{self, Change};
 use crate::repeats::by_unit;
 use crate::result::{ChangedUnit, DifferentLevel, Fleet, Stranger};
-use crate::studies::{self, Options};
 use crate::tree::{LeftOut, Measurement, Tree};
 use crate::triad::{Estimated, Triad};
 
@@ -27,20 +26,16 @@ use crate::triad::{Estimated, Triad};
 ///
 /// # Errors
 /// Fewer than five comparable units, or a triad whose covariances are singular.
-pub fn fleet(tree: Tree, part: Option<&Part>, options: &Options) -> Result<Fleet, Error> {
-    Ok(analysed(tree, part, options)?.0)
+pub fn fleet(tree: Tree, part: Option<&Part>) -> Result<Fleet, Error> {
+    Ok(analysed(tree, part)?.0)
 }
 
 /// The same, with the population as a prior of a further unit.
 ///
 /// # Errors
 /// Those of [`fleet`], and fewer units than a prior needs.
-pub fn fleet_and_prior(
-    tree: Tree,
-    part: Option<&Part>,
-    options: &Options,
-) -> Result<(Fleet, Prior), Error> {
-    let (result, triads, of) = analysed(tree, part, options)?;
+pub fn fleet_and_prior(tree: Tree, part: Option<&Part>) -> Result<(Fleet, Prior), Error> {
+    let (result, triads, of) = analysed(tree, part)?;
     let prior = prior::prior(&result.tool, &triads, of)?;
     Ok((result, prior))
 }
@@ -48,11 +43,7 @@ pub fn fleet_and_prior(
 /// What the readings of the fleet are in, and what was known of their input.
 type Readings = (RawUnit, Option<Reference>);
 
-fn analysed(
-    mut tree: Tree,
-    part: Option<&Part>,
-    options: &Options,
-) -> Result<(Fleet, Vec<Triad>, Readings), Error> {
+fn analysed(mut tree: Tree, part: Option<&Part>) -> Result<(Fleet, Vec<Triad>, Readings), Error> {
     let (setting, reference) = keep_comparable(&mut tree);
     let all = &tree.measurements;
     let raw_unit = all.first().map_or(RawUnit::Si, |m| m.of.raw_unit);
@@ -98,7 +89,6 @@ fn analysed(
             .collect::<Vec<&[Row]>>()
     });
     let collected = capability::collect(rows);
-    let gage = studies::study(all, &constant, &triads, options);
     let changed_units = changes.iter().filter_map(|change| {
         let triad = triads
             .iter()
@@ -133,7 +123,6 @@ fn analysed(
         different,
         changed: charts.changed,
         drift: charts.drift,
-        gage,
         part: part.map(|p| p.name.clone()),
         capability: capability::indices(&collected),
         left_out: Vec::new(),

@@ -10,9 +10,8 @@
 //! | `remeasured` | units that are measured on many days and change |
 //! | [`levels`] | batches, fixtures, operators that differ from the others |
 //! | [`drift`] | control charts (EWMA) by date |
-//! | [`gage`] | repeatability and reproducibility (Gage R&R) |
 //! | [`capability`] | Cp and Cpk against the limits of a part |
-//! | `triad`, `charts`, `studies` | these of one triad, of all labels, of all parameters |
+//! | `triad`, `charts` | these of one triad, of all labels |
 //! | `judge` | the judgement |
 //! | [`prior`] | the population as a prior of a further unit |
 //! | [`fleet`](mod@fleet) | puts it together |
@@ -24,7 +23,6 @@ pub mod capability;
 mod charts;
 pub mod drift;
 pub mod fleet;
-pub mod gage;
 mod judge;
 pub mod labels;
 pub mod levels;
@@ -35,10 +33,8 @@ mod remeasured;
 pub mod repeats;
 pub mod result;
 mod robust;
-mod studies;
 pub mod tree;
 mod triad;
 
 pub use fleet::{fleet, fleet_and_prior};
 pub use result::Fleet;
-pub use studies::Options;

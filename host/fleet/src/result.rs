@@ -7,7 +7,6 @@ use mimu::{Judgement, PerSensor};
 use serde::Serialize;
 
 use crate::capability::Capability;
-use crate::gage::Sigma;
 use crate::tree::LeftOut;
 
 /// The result.
@@ -52,8 +51,6 @@ pub struct Fleet {
     pub changed: Vec<ChangedLevel>,
     /// Control charts of all units.
     pub drift: Option<Drift>,
-    /// Repeatability and reproducibility.
-    pub gage: Option<GageStudy>,
     /// Part whose limits are compared; null without.
     pub part: Option<String>,
     /// Capability against its limits.
@@ -223,46 +220,4 @@ pub struct ChartOfParameter {
     pub averages: Vec<f64>,
     /// Its limit.
     pub limits: Vec<f64>,
-}
-
-/// Repeatability and reproducibility.
-#[derive(Debug, Clone, Serialize)]
-pub struct GageStudy {
-    /// Units that were measured repeatedly, and of these those that were used.
-    pub units: [usize; 2],
-    /// Measurements of these.
-    pub measurements: usize,
-    /// Factors.
-    pub factors: Vec<String>,
-    /// Parameters.
-    pub parameters: Vec<GageOfParameter>,
-}
-
-/// Repeatability and reproducibility of a parameter.
-#[derive(Debug, Clone, Serialize)]
-pub struct GageOfParameter {
-    /// Sensor.
-    pub sensor: Sensor,
-    /// Parameter in files, or property and axis.
-    pub name: String,
-    /// SI unit, or that of the data sheet.
-    pub unit: String,
-    /// Repeatability.
-    pub repeatability: Sigma,
-    /// Typical standard deviation of a fit, a part of repeatability.
-    pub fit_sigma: f64,
-    /// Reproducibility.
-    pub reproducibility: Sigma,
-    /// Both: the measurement.
-    pub measurement: Sigma,
-    /// Between units.
-    pub between_units: Sigma,
-    /// Standard deviation of each component.
-    pub components: BTreeMap<String, f64>,
-    /// Measurement over the whole variation, standard deviations.
-    pub share_of_variation: f64,
-    /// Six standard deviations of the measurement over the width of the tolerance; null without a limit.
-    pub share_of_tolerance: Option<f64>,
-    /// Number of distinct categories (AIAG).
-    pub categories: f64,
 }

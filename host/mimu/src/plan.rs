@@ -216,14 +216,6 @@ impl Plan {
         self
     }
 
-    /// The same with a time before the first dwell, s, and so many rounds; `round_s` from one to the next, if the table waits for it.
-    pub fn in_rounds(mut self, lead_in_s: f64, rounds: u32, round_s: Option<f64>) -> Self {
-        self.lead_in_s = round(lead_in_s, 1e3);
-        self.rounds = rounds;
-        self.round_s = round_s.map(|s| round(s, 1e3));
-        self
-    }
-
     /// Text of the file; `about` is put in front as a comment, line by line.
     pub fn to_toml(&self, about: &str) -> String {
         let about: String = about.lines().map(|line| format!("# {line}\n")).collect();
@@ -234,7 +226,7 @@ impl Plan {
     pub fn read(path: &Path) -> Result<Self> {
         let place = path.display().to_string();
         let text = read_text(path)?;
-        let again = "write the plan with `mimu design` or `mimu thermal plan`";
+        let again = "write the plan with `mimu design`, or copy one of rig/plans";
         check_kind(&text, &place, "mimu-plan")?;
         let plan: Self = parse_toml(&text, &place, Some(again))?;
         if !(1..=MOST_DWELLS).contains(&(plan.rounds as usize)) {
@@ -247,7 +239,7 @@ impl Plan {
             return Err(Error::new(
                 place,
                 problem,
-                "name a plan of `mimu design` or `mimu thermal plan`",
+                "name a plan of `mimu design`, or one like those of rig/plans",
             ));
         }
         Ok(plan)

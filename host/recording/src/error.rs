@@ -88,16 +88,11 @@ arguments! {
     SignedLowByte, "--signed-low-byte", "Columns whose low byte a firmware took for a signed number.";
     Force, "--force", "Writing a calibration that is judged a misfit.";
     Base, "--base", "The calibration at one temperature that curves are added to.";
-    Range, "--range", "Temperatures that a plan covers.";
-    Curves, "--curves line", "Shape of curves over temperature.";
-    SetPoints, "--points", "Set points of a soak.";
-    Soak, "--soak", "Time at a set point.";
     StepTimes, "--step-every", "When the dwells of a recording begin and end.";
     RawUnit, "--raw-unit", "Unit of the readings.";
     Units, "--units", "Units of the readings in a file.";
     TextColumns, "--text", "Names of the numbers in a line of text.";
     Baud, "--baud", "Bits a second of a serial port.";
-    Driver, "--driver", "What turns or warms the unit.";
     Fixture, "--fixture", "What carries the unit.";
     Gravity, "--gravity", "Local gravity.";
     Latitude, "--latitude", "Latitude.";
@@ -107,7 +102,6 @@ arguments! {
     Seed, "--seed", "Order of the planned dwells.";
     Drift, "--drift", "Largest change of temperature during a session.";
     Prior, "--prior", "The population that a unit is from.";
-    EstimatedBy, "--by", "Whether the PC or the device estimates the calibration.";
     Output, "-o", "Folder that is written.";
     CalibrationOfNoise, "mimu allan --calibration", "The calibration that a noise file is made with.";
     Noise, "--noise", "Noise of the unit.";

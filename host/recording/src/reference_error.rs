@@ -15,7 +15,7 @@ pub struct ReferenceError {
     /// Where they come from: number and date of a certificate, or how they were measured.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub source: String,
-    /// The chain of calibrations that leads from the reference to the SI: who calibrated it, when, against what. A certificate needs it.
+    /// The chain of calibrations that leads from the reference to the SI: who calibrated it, when, against what.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub traceability: String,
     /// Keys whose number is the limit of a rectangular distribution, as of a tolerance, instead of half of a 95 % interval.

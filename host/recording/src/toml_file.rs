@@ -21,7 +21,7 @@ pub fn read_text(path: &Path) -> Result<String> {
 }
 
 /// Files of this program, by the name in their key `format`, with what makes them.
-const FILES: [(&str, &str); 9] = [
+const FILES: [(&str, &str); 8] = [
     ("mimu-calibration", "a calibration (`mimu fit -o`)"),
     ("mimu-noise", "a noise file (`mimu allan -o`)"),
     ("mimu-plan", "a plan (`mimu design -o`)"),
@@ -34,10 +34,6 @@ const FILES: [(&str, &str); 9] = [
     (
         "mimu-reference",
         "the errors of a reference (--reference-error)",
-    ),
-    (
-        "mimu-particulars",
-        "the particulars of a certificate (`mimu report --certificate`)",
     ),
     (
         "mimu-thermal-biases",

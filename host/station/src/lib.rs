@@ -17,7 +17,6 @@
 //! | [`population`] | limits by the units of the same kind |
 //! | [`decision`] | the decision about a value near its limit (JCGM 106) |
 //! | [`document`] | the result, `mimu-measurements/1` |
-//! | [`golden`] | the unit that tells whether the station still measures what it measured before |
 
 pub mod bits;
 pub mod boards;
@@ -25,7 +24,6 @@ pub mod decision;
 pub mod document;
 pub mod faces;
 pub mod gather;
-pub mod golden;
 pub mod limits;
 pub mod measured;
 pub mod noise;

@@ -171,8 +171,4 @@ impl Source for DeviceSource {
         self.streaming = false;
         Some(&mut self.session)
     }
-
-    fn aside(&mut self) -> Option<&mut Session> {
-        Some(&mut self.session)
-    }
 }

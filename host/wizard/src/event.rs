@@ -1,4 +1,4 @@
-//! Output of a session: events, reported once each, and the state, reported many times a second. Both are plain data, so that the full screen, lines
+//! Output of a session: events, reported once each, and the state, reported many times a second. Both are plain data, so that lines
 //! of text and JSON lines are views of the same.
 
 use std::fmt;

@@ -24,7 +24,6 @@ use mimu_recording::{
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use crate::bank::ByDevice;
 pub use crate::part::Part;
 use crate::procedure::SessionConfig;
 use crate::spin::Spin;
@@ -108,8 +107,6 @@ pub enum Entry {
         /// Ids of its effects.
         effects: Vec<String>,
     },
-    /// Estimates of the device's filters from all dwells.
-    ByDevice(ByDevice),
     /// The session is complete.
     Done,
 }

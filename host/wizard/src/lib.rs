@@ -20,7 +20,6 @@
 //! | [`folder`] | the journal and the recordings, from which a killed session resumes |
 //! | [`unit_session`] | one of the units, with its accepted and discarded dwells |
 //! | [`axes`] | checks that the axes match their names |
-//! | [`bank`] | the device's own Kalman filters during the session |
 //! | [`event`] | events and questions of a session; views show them |
 //! | [`wizard`] | chooses the next dwell, and records which units have completed it |
 //! | [`store`] | stores a calibration on the device, reads it back, and checks that it survives a power cycle |
@@ -29,7 +28,6 @@
 //! | [`session`] | the whole session, in order |
 
 pub mod axes;
-pub mod bank;
 pub mod clock;
 pub mod device;
 pub mod event;

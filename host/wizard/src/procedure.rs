@@ -93,9 +93,6 @@ pub struct SessionConfig {
     /// Whole turns by hand after the poses, if the session has them: how many, and how well the unit is put back.
     #[serde(default)]
     pub whole_turns: Option<WholeTurns>,
-    /// Whether the device's own Kalman filters give the calibration; on a table only.
-    #[serde(default)]
-    pub by_device: bool,
     /// The population that the units are from, by hand only. Kept with the session, because its poses do not suffice without it.
     #[serde(default)]
     pub prior: Option<Prior>,
@@ -466,7 +463,6 @@ mod tests {
             mounting_deg: 0.0,
             reference_error: None,
             whole_turns: None,
-            by_device: false,
             prior: None,
         }
     }

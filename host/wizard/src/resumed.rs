@@ -7,9 +7,8 @@ use mimu_recording::error::{Argument, Error, Result};
 use crate::procedure::SessionConfig;
 
 /// Settings that determined the recorded dwells. With other values these dwells would be wrong.
-fn kept(config: &SessionConfig) -> [(Argument, &'static str, String); 8] {
+fn kept(config: &SessionConfig) -> [(Argument, &'static str, String); 7] {
     let or_none = |given: Option<String>| given.unwrap_or_else(|| "none".into());
-    let by = if config.by_device { "device" } else { "pc" };
     [
         (Argument::Fixture, "fixture", config.fixture.name().into()),
         (
@@ -32,7 +31,6 @@ fn kept(config: &SessionConfig) -> [(Argument, &'static str, String); 8] {
             "largest rate",
             format!("{} deg/s", config.largest_rate_dps),
         ),
-        (Argument::EstimatedBy, "estimator", by.into()),
         (
             Argument::TextColumns,
             "line of the board",
@@ -128,7 +126,6 @@ mod tests {
             mounting_deg: 0.02,
             reference_error: None,
             whole_turns: None,
-            by_device: false,
             prior: None,
         }
     }

@@ -333,11 +333,6 @@ impl OpenSession<'_> {
             }
             fits.push(fitted);
         }
-        if self.wizard.config.by_device {
-            for (k, fitted) in fits.iter_mut().enumerate() {
-                self.take_from_device(k, fitted)?;
-            }
-        }
         if self.wizard.config.fixture == Fixture::Table {
             for fitted in &mut fits {
                 add_mounting_uncertainty(fitted, self.wizard.config.mounting_deg);
@@ -396,36 +391,6 @@ impl OpenSession<'_> {
         let place = path.display().to_string();
         self.wizard.store(k, calibration, &place).await?;
         self.outcomes[k].stored = Some(place);
-        Ok(())
-    }
-
-    /// Replaces the fit by the estimate of the device's filters, if they received all dwells.
-    fn take_from_device(&mut self, k: usize, fitted: &mut Fit) -> Result<()> {
-        let unit = &mut self.wizard.units[k];
-        let name = unit.name();
-        let before = unit.folder.entries().iter().rev().find_map(|e| match e {
-            Entry::ByDevice(found) => Some(*found),
-            _ => None,
-        });
-        let found = match (before, unit.banks.take()) {
-            (Some(found), _) => Ok(found),
-            (None, Some(mut banks)) => banks.end(&unit.station),
-            (None, None) => Err("they were not run".into()),
-        };
-        let words = match found {
-            Ok(found) => {
-                if before.is_none() {
-                    unit.folder.add(Entry::ByDevice(found))?;
-                }
-                found.replace(fitted, &name)?
-            }
-            Err(why) => format!(
-                "the calibration is the PC's fit, because the device's filters lack dwells: {why}"
-            ),
-        };
-        self.outcomes[k].notes.push(words.clone());
-        let words = format!("{name}: {words}");
-        self.wizard.tell(Event::Note { words });
         Ok(())
     }
 

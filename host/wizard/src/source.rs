@@ -22,7 +22,7 @@ pub struct Unit {
     pub nominal: Option<[Affine<f64>; 2]>,
     /// Its reset cause and stored calibration, in words.
     pub told: Vec<String>,
-    /// Whether it stores calibrations, and runs self-tests and Kalman banks.
+    /// Whether it stores calibrations, and runs self-tests.
     pub is_device: bool,
     /// Last reset cause, unless it was a power-on.
     pub start: Option<String>,
@@ -96,11 +96,6 @@ pub trait Source: Send {
 
     /// The session, if this is a mimu device. The stream restarts with the next [`Source::next`], whatever was requested.
     fn device(&mut self) -> Option<&mut Session> {
-        None
-    }
-
-    /// The session for short calls that do not interrupt the stream: no sample is lost.
-    fn aside(&mut self) -> Option<&mut Session> {
         None
     }
 }

@@ -82,24 +82,6 @@ pub struct SpinState {
     pub turns: Option<f64>,
 }
 
-impl SpinState {
-    /// What to do now, in short.
-    pub fn words(&self) -> String {
-        let (sign, axis) = self.axis.split_at(1);
-        let way = match sign {
-            "-" => "clockwise",
-            _ => "counterclockwise",
-        };
-        match self.turns {
-            None => format!("+{axis} face up against an edge, at rest"),
-            Some(_) => format!(
-                "turn it {way} {} times about {axis}, and back to the edge",
-                self.asked
-            ),
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

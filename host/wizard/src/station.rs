@@ -114,25 +114,9 @@ impl Station {
         &self,
         errand: impl FnOnce(&mut Session) -> Result<T> + Send + 'static,
     ) -> Result<T> {
-        self.of(|source| source.device(), errand)
-    }
-
-    /// Like [`Self::with`], for short calls that lose no sample.
-    pub fn aside<T: Send + 'static>(
-        &self,
-        errand: impl FnOnce(&mut Session) -> Result<T> + Send + 'static,
-    ) -> Result<T> {
-        self.of(|source| source.aside(), errand)
-    }
-
-    fn of<T: Send + 'static>(
-        &self,
-        session: impl FnOnce(&mut dyn Source) -> Option<&mut Session> + Send + 'static,
-        errand: impl FnOnce(&mut Session) -> Result<T> + Send + 'static,
-    ) -> Result<T> {
         let (back, answer) = channel();
         let errand: Errand = Box::new(move |source| {
-            let done = match source.as_mut().and_then(|s| session(s.as_mut())) {
+            let done = match source.as_mut().and_then(|s| s.device()) {
                 Some(session) => errand(session),
                 None => Err(Error::device(
                     "device",

@@ -18,7 +18,6 @@ use self::conditions::{Tilts, Turns, motion_limits, rate_limit_dps};
 use self::rows::{Pending, known};
 use self::spins::Spinning;
 use crate::axes;
-use crate::bank::DeviceBanks;
 use crate::event::{Event, UnitState};
 use crate::folder::{Entry, Folder, OpenRecording, Part};
 use crate::procedure::{Fixture, SessionConfig};
@@ -140,8 +139,6 @@ pub struct UnitSession {
     seen: Option<LastSecond>,
     part: Part,
     number: i32,
-    /// The device's filters, if their estimate is to be the calibration.
-    pub banks: Option<DeviceBanks>,
 }
 
 /// Why the unit has begun anew, if this event says so.
@@ -194,7 +191,6 @@ impl UnitSession {
             seen: None,
             part: Part::Calibration,
             number: 0,
-            banks: None,
         }
     }
 
@@ -243,12 +239,6 @@ impl UnitSession {
             _ => None,
         });
         self.number = had.max().unwrap_or(0);
-        self.banks = (config.by_device && part == Part::Calibration).then(|| match self.number {
-            0 => DeviceBanks::default(),
-            _ => DeviceBanks::incomplete(
-                "the session was interrupted, so they lack the dwells before",
-            ),
-        });
         // Waiting events are from before this recording. It names a restart since the calibration at its first sample: its biases are others.
         while let Some(news) = self.station.news()? {
             self.restarted = restart(&news).or(self.restarted.take());
@@ -303,11 +293,6 @@ impl UnitSession {
                 }
                 SourceEvent::Restarted(why) => {
                     self.interrupted(Interruption::Restarted(why), tell)?;
-                    if let Some(banks) = &mut self.banks {
-                        banks.mark_incomplete(
-                            "the device restarted, so they lack the dwells before",
-                        );
-                    }
                 }
                 SourceEvent::Note(words) => tell.push(Event::Note {
                     words: format!("{}: {words}", self.name()),
@@ -497,7 +482,6 @@ impl UnitSession {
             }
             (Ok(step), None) => {
                 let from = seen.tick.saturating_sub((BEFORE_S * rate_hz) as u64);
-                self.begin_banks(&step, config);
                 let had = (self.pending.rows.len() - self.pending.before(from)) as u64;
                 self.dwell = Some(Dwell {
                     step,
@@ -523,28 +507,12 @@ impl UnitSession {
         Ok(())
     }
 
-    /// Sends the present input to the device's filters.
-    fn begin_banks(&mut self, step: &Step, config: &SessionConfig) {
-        let (Some(banks), Some(noise)) = (&mut self.banks, self.watch.noise()) else {
-            return;
-        };
-        let mut input = known(step, config);
-        for rate in &mut input[..3] {
-            *rate = rate.to_radians();
-        }
-        let spans = [config.largest_rate_dps.to_radians(), config.gravity_mps2];
-        banks.begin(&self.station, &noise, input, spans);
-    }
-
     /// Discards the running dwell.
     fn discard(&mut self, why: &Waiting, tell: &mut Vec<Event>) -> Result<()> {
         self.state.left_s = None;
         let Some(dwell) = self.dwell.take() else {
             return Ok(());
         };
-        if let Some(banks) = &mut self.banks {
-            banks.back(&self.station);
-        }
         let rate_hz = self.station.unit.rate_hz;
         let lasted = self.next.unwrap_or(dwell.from).saturating_sub(dwell.from);
         if lasted as f64 > (BEFORE_S + BEGUN_S) * rate_hz && !self.is_turned() {
@@ -570,9 +538,6 @@ impl UnitSession {
     ) -> Result<()> {
         let config = round.config;
         self.check_temperature(seen, config)?;
-        if let Some(banks) = &mut self.banks {
-            banks.keep(&self.station);
-        }
         let Some(recording) = &mut self.recording else {
             return Ok(());
         };
@@ -717,9 +682,6 @@ impl UnitSession {
         };
         let part = self.part;
         self.folder.add(Entry::Redo { part, number })?;
-        if let Some(banks) = &mut self.banks {
-            banks.mark_incomplete("a dwell that they had received was repeated");
-        }
         if let Some(recording) = &mut self.recording {
             recording.drop_dwell(number);
         }

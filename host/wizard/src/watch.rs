@@ -164,11 +164,6 @@ impl Watch {
         }
     }
 
-    /// Variances of single readings in the quietest second so far, raw.
-    pub fn noise(&self) -> Option<[f64; 6]> {
-        self.floor
-    }
-
     /// Adds samples. Returns the statistics of the last second, if it is complete.
     pub fn take(&mut self, chunk: &Chunk) -> Option<LastSecond> {
         let missing = chunk.tick.saturating_sub(self.next.unwrap_or(chunk.tick));
@@ -663,7 +658,7 @@ mod tests {
     fn a_reading_that_is_repeated_for_a_second_does_not_lower_the_noise() {
         let mut watch = Watch::new(1000.0, true);
         in_hand(&mut watch, 0..5000, |_| 0.0);
-        let noise = watch.noise().unwrap();
+        let noise = watch.floor.unwrap();
         watch.begin();
         let mut last = chunk(4999, 1, 0.0, 0.01).values[0];
         last[5] += 9.8;
@@ -672,7 +667,7 @@ mod tests {
         watch.take(&held);
         let after = in_hand(&mut watch, 6000..9000, |_| 0.0);
         assert!(after[after.len() - 1].motion.iter().all(|m| *m < 1.0));
-        let now = watch.noise().unwrap();
+        let now = watch.floor.unwrap();
         assert!((0..6).all(|c| now[c] > 0.9 * noise[c]), "{noise:?} {now:?}");
     }
 

@@ -1,6 +1,5 @@
 //! `mimu accept`: arguments and execution.
 
-mod golden;
 mod units;
 
 use std::path::{Path, PathBuf};
@@ -78,8 +77,6 @@ pub(crate) struct AcceptArgs {
     /// Calibration that the unit came with: the measurements through it are reported beside the others, as found
     #[arg(long, value_name = "FILE", requires = "calibration")]
     as_found: Option<PathBuf>,
-    #[command(flatten)]
-    golden: golden::GoldenArgs,
     /// Folder for one JSON file for each unit, UNIT-TIME.json
     #[arg(short, value_name = "DIR")]
     output: Option<PathBuf>,
@@ -212,7 +209,6 @@ impl<'a> Station<'a> {
     }
 
     fn measured(&self, document: Document, samples: &[Samples]) -> Result<Document> {
-        self.args.golden.check_shift(&samples[0].unit, &self.time)?;
         let (limits, part) = (&self.limits, self.part.as_ref());
         for of in [&self.calibration, &self.as_found].into_iter().flatten() {
             let (name, unit) = (&of.device, &samples[0].unit);
@@ -231,9 +227,6 @@ impl<'a> Station<'a> {
                 measurements,
             });
         }
-        self.args
-            .golden
-            .compare(&samples[0].unit, &self.time, &found.measured)?;
         Ok(document)
     }
 
@@ -312,7 +305,6 @@ impl<'a> Station<'a> {
 pub(crate) fn run(args: &AcceptArgs) -> Result<Status> {
     check_outputs(&[args.json.file()], &[])?;
     let station = Station::of(args)?;
-    args.golden.check()?;
     let (mut failed, mut refused) = (false, Vec::new());
     let several = args.several();
     if several && args.json.is_given() {

@@ -2,7 +2,6 @@
 
 mod comparison;
 mod transfer;
-mod trim;
 
 use std::io::Write as _;
 use std::sync::Arc;
@@ -40,16 +39,12 @@ enum DeviceCommand {
     Upload(transfer::UploadArgs),
     /// Fetch the stored calibration
     Download(transfer::DownloadArgs),
-    /// Correct the offsets of the stored calibration at today's temperature; the unit has to lie still
-    Trim(trim::TrimArgs),
     /// Deflect the sensors electrically and measure the deflection; the unit has to stand still
     SelfTest(PlainArgs),
     /// Show the counters: lost samples, garbled frames, flash errors
     Counters(CountersArgs),
     /// Compare its compensated stream with the PC's compensation of its raw stream
     Check(comparison::CheckArgs),
-    /// Run its Kalman bank with known inputs and compare it with the PC's on the same samples
-    Kalman(comparison::KalmanArgs),
 }
 
 #[derive(Args)]
@@ -149,11 +144,9 @@ pub fn run(args: &DeviceArgs) -> Result<()> {
         DeviceCommand::Stream(args) => run_stream(args),
         DeviceCommand::Upload(args) => transfer::run_upload(args),
         DeviceCommand::Download(args) => transfer::run_download(args),
-        DeviceCommand::Trim(args) => trim::run_trim(args),
         DeviceCommand::SelfTest(args) => run_self_test(args),
         DeviceCommand::Counters(args) => counters(args),
         DeviceCommand::Check(args) => comparison::run_check(args),
-        DeviceCommand::Kalman(args) => comparison::run_kalman(args),
     }
 }
 

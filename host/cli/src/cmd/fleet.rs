@@ -6,7 +6,7 @@ use clap::Args;
 use mimu::data_sheet::Part;
 use mimu_fleet::labels::LabelTable;
 use mimu_fleet::tree::{Search, Tree};
-use mimu_fleet::{Options, fleet, fleet_and_prior};
+use mimu_fleet::{fleet, fleet_and_prior};
 use mimu_recording::error::Result;
 
 use crate::arguments::{JsonArgs, VerboseArgs};
@@ -27,10 +27,7 @@ pub struct FleetArgs {
     /// Names of folders without `=`, from the outermost: `line,batch`; `-` skips one
     #[arg(long = "folders", value_name = "NAMES", value_delimiter = ',')]
     names: Vec<String>,
-    /// Labels that are factors of repeatability and reproducibility [default: operator, fixture, station, date]
-    #[arg(long, value_name = "LABELS", value_delimiter = ',')]
-    gage: Vec<String>,
-    /// Limits for Cpk and shares of tolerance: the data sheet of a part (icm42688p, mpu6050, lsm6dso, lsm6dsv16x, bmi088, bmi270), or a file of your own
+    /// Limits for Cpk: the data sheet of a part (icm42688p, mpu6050, lsm6dso, lsm6dsv16x, bmi088, bmi270), or a file of your own
     /// (mimu-part/1)
     #[arg(long, visible_alias = "part", value_name = "NAME|FILE.toml")]
     limits: Option<String>,
@@ -62,15 +59,12 @@ pub fn run(args: &FleetArgs, command_line: &str) -> Result<()> {
     let bar = progress("reading");
     let tree = Tree::read(&args.folders, search, &|share| bar.reach(share));
     bar.finish();
-    let options = Options {
-        factors: args.gage.clone(),
-    };
     let (result, prior) = match args.prior.is_some() {
         true => {
-            let (result, prior) = fleet_and_prior(tree?, part.as_ref(), &options)?;
+            let (result, prior) = fleet_and_prior(tree?, part.as_ref())?;
             (result, Some(prior))
         }
-        false => (fleet(tree?, part.as_ref(), &options)?, None),
+        false => (fleet(tree?, part.as_ref())?, None),
     };
     let mut out = Results::new(fleet_text(&result, args.verbose.verbose));
     let made = Made::of(&args.folders, command_line);

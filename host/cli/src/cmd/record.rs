@@ -117,8 +117,7 @@ pub fn run(args: &RecordArgs) -> Result<()> {
         (Some(plan), Some(path), _) => {
             if args.transit.is_some() && plan.is_procedure() {
                 let problem = "its turns or rounds take as long as the table needs, so no fixed transit time fits";
-                let remedy =
-                    "carry it out with `mimu thermal record`, or mark the dwells with --steps";
+                let remedy = "mark the dwells with --steps";
                 return Err(Error::new(path.display(), problem, remedy));
             }
             let dwells = plan.dwells(gravity_mps2, &path.display().to_string())?;
@@ -158,7 +157,6 @@ pub fn run(args: &RecordArgs) -> Result<()> {
         duration: args.duration,
         steps,
         reconnect: args.of.reconnect,
-        one_power_on: false,
         table,
         device: args.of.device(plan.as_ref()),
         gravity_mps2,
@@ -180,7 +178,6 @@ pub fn run(args: &RecordArgs) -> Result<()> {
         UserRequest {
             end: stop.load(Ordering::Relaxed),
             marks: marks.as_ref().map_or(0, |m| m.try_iter().count() as u32),
-            drop: None,
         }
     };
     let bar = progress("writing parquet");

@@ -1,9 +1,5 @@
 //! `mimu thermal`.
 
-mod plan;
-#[cfg(not(target_family = "wasm"))]
-mod record;
-
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
@@ -35,11 +31,6 @@ pub(crate) struct ThermalArgs {
 enum ThermalCommand {
     /// Estimate all parameters over temperature, and the lag of the dies behind the thermometer
     Fit(Box<FitArgs>),
-    /// Plan a procedure; prints its duration and the expected uncertainty of the curves
-    Plan(plan::PlanArgs),
-    #[cfg(not(target_family = "wasm"))]
-    /// Carry out a plan: set the chamber, move the table, and record the device
-    Record(record::RecordArgs),
 }
 
 /// Arguments of `mimu thermal fit`.
@@ -117,13 +108,8 @@ const MISFIT: &str =
     "look for jumps and moves in the plot and leave those parts out, or write it all the same";
 
 pub(crate) fn run(args: &ThermalArgs, command_line: &str) -> Result<Status> {
-    let done = |()| Status::Done;
-    match &args.command {
-        ThermalCommand::Fit(args) => run_fit(args, command_line),
-        ThermalCommand::Plan(args) => plan::run(args).map(done),
-        #[cfg(not(target_family = "wasm"))]
-        ThermalCommand::Record(args) => record::run(args).map(done),
-    }
+    let ThermalCommand::Fit(args) = &args.command;
+    run_fit(args, command_line)
 }
 
 fn run_fit(args: &FitArgs, command_line: &str) -> Result<Status> {

@@ -83,9 +83,6 @@ pub(crate) struct WizardArgs {
     mounting: Option<f64>,
     #[command(flatten)]
     whole: SpinArgs,
-    /// Whose estimate becomes the calibration; the other one is compared with it
-    #[arg(long, value_enum, default_value = "pc")]
-    by: By,
     /// Make exactly the planned dwells, whatever the targets
     #[arg(long)]
     as_planned: bool,
@@ -105,9 +102,6 @@ pub(crate) struct WizardArgs {
     /// Write the events as JSON lines (`-`: to standard output)
     #[arg(long, value_name = "FILE")]
     events: Option<PathBuf>,
-    /// Write lines of text even on a terminal that is large enough for the full screen (80 x 24)
-    #[arg(long)]
-    plain: bool,
     #[command(flatten)]
     json: JsonArgs,
 }
@@ -172,14 +166,6 @@ fn begun_rate_hz(folder: &Path) -> Option<f64> {
     begun.ok().map(|m| m.sample_rate_hz)
 }
 
-#[derive(Clone, Copy, PartialEq, ValueEnum)]
-enum By {
-    /// The PC's fit
-    Pc,
-    /// The device's Kalman filters, which need a table
-    Device,
-}
-
 #[derive(Clone, Copy, ValueEnum)]
 enum FixtureArg {
     /// A turntable: attitudes and rates are known
@@ -225,10 +211,9 @@ impl WizardArgs {
         let Some((path, mut error)) = stated else {
             return Ok(None);
         };
-        if fixture != Fixture::Table || self.by == By::Device {
-            let problem = "[reference_error] is for fits with a table's inputs, by the PC";
-            let remedy =
-                "use --fixture table without --by device, or remove the table from the file";
+        if fixture != Fixture::Table {
+            let problem = "[reference_error] is for fits with a table's inputs";
+            let remedy = "use --fixture table, or remove the table from the file";
             return Err(Error::new(path.display(), problem, remedy));
         }
         let by_file = error.mounting_deg > 0.0;
@@ -274,12 +259,6 @@ impl WizardArgs {
 
     fn config(&self) -> Result<SessionConfig> {
         let fixture = self.fixture.fixture();
-        if self.by == By::Device && (fixture != Fixture::Table || self.text.text.is_some()) {
-            let problem =
-                "the device's Kalman filters need the known input, and only a table gives it";
-            let remedy = "use --fixture table with a mimu device, or leave --by device out";
-            return Err(Error::new("--by device", problem, remedy));
-        }
         let whole_turns = whole_turns(self.whole.turns, self.whole.placement)?;
         if whole_turns.is_some() && (fixture == Fixture::Table || !self.drivers.is_empty()) {
             let problem = "whole turns are turned by hand, with gravity as the reference";
@@ -341,7 +320,6 @@ impl WizardArgs {
             },
             reference_error,
             whole_turns,
-            by_device: self.by == By::Device,
             prior,
         })
     }
@@ -364,7 +342,7 @@ fn planned(plan: &Plan, fixture: Fixture, gravity_mps2: f64, path: &Path) -> Res
         if dwell.turn.is_some() {
             let at = format!("{place}, dwell {k}");
             let problem = "it is a turn by an angle; the wizard makes dwells only";
-            let remedy = "carry it out with `mimu thermal record`, or give another plan";
+            let remedy = "record it with `mimu record --plan` and --steps, or give another plan";
             return Err(Error::new(at, problem, remedy));
         }
         if dwell.rate_dps != 0.0 && fixture != Fixture::Table {
@@ -419,7 +397,6 @@ pub(crate) fn session(
         ("--driver", !args.drivers.is_empty()),
         ("--events", args.events.is_some()),
         ("--json", args.json.is_given()),
-        ("--plain", args.plain),
         ("--yes", args.yes),
     ];
     let by_hand = args.fixture.fixture() != Fixture::Table;

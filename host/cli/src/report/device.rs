@@ -5,12 +5,11 @@ use mimu::quantity::{AXES, Sensor, plural, significant};
 use mimu::readable::STANDARD_GRAVITY;
 use mimu_device::record::RecordSummary;
 use mimu_device::{
-    Checked, Contents, Counted, DeviceResult, Identity, KalmanRun, LineCount, SelfTested, Streamed,
-    Trimmed, Uploaded, Verdict,
+    Checked, Contents, Counted, DeviceResult, Identity, LineCount, SelfTested, Streamed, Uploaded,
+    Verdict,
 };
 
 use super::page::all_warnings;
-use super::table::{number, table};
 use super::terminal::text;
 
 /// Result of `mimu device info`.
@@ -229,46 +228,5 @@ pub fn check_text(result: &DeviceResult<Checked>) -> String {
         @if found.holds { p { "device and PC agree to rounding" } }
         @else if !found.not_judged_for.is_empty() { p { "not judged: " (found.not_judged_for.join(", ")) " depends on temperatures before the comparison" } }
         @else { p { "device and PC DIFFER" } }
-    })
-}
-
-/// Result of `mimu device kalman`.
-pub fn kalman_text(result: &DeviceResult<KalmanRun>) -> String {
-    let run = &result.found;
-    text(&html! {
-        p { (result.port) ": Kalman bank of the " (run.triad) ", forward model u = P x + b, " (run.direction) }
-        @for applied in &run.inputs {
-            @let [x, y, z] = applied.input;
-            p { (format!("input {x:>9} {y:>9} {z:>9} {}   samples {} to {}", run.input_unit, applied.first, applied.last)) }
-        }
-        (table("Estimates of the device and of the PC", &html! { th {} th.n { "device" } th.n { "sigma" } th.n { "PC" } th.n { "difference / sigma" } th { "unit" } }, &html! {
-            @for (i, axis) in AXES.iter().enumerate() { @for (k, (name, unit)) in run.parameters.iter().zip(&run.units).enumerate() { tr {
-                td { (axis) " " (name) } td.n { (format!("{:.7}", run.device[i].mean[k])) } (number(run.device[i].sigma[k], 1.0))
-                td.n { (format!("{:.7}", run.host[i].mean[k])) } (number(run.distance_sigma[i][k], 1.0)) td { (unit) }
-            } } }
-        }))
-        p { "largest difference " (significant(run.largest_distance_sigma)) " sigma; samples rejected: " (run.rejected) }
-    })
-}
-
-/// Result of `mimu device trim`.
-pub fn trim_text(result: &DeviceResult<Trimmed>) -> String {
-    let found = &result.found;
-    // rad/s is shown as deg/s, m/s² as mg.
-    let (deg, mg) = (1_f64.to_degrees(), 1e3 / STANDARD_GRAVITY);
-    text(&html! {
-        p { (result.port) (format!(": trimmed at {:.1} °C: stored {} (read back); before: {}", found.temp_c, found.hash, found.before)) }
-        (table("", &html! { th {} th.n { "before" } th.n { "after" } th { (format!("means of {:.0} s and their standard deviations", found.averaged_s)) } }, &html! {
-            @for (name, triad, factor, unit) in [("gyro", &found.triads.gyro, deg, "deg/s"), ("accel", &found.triads.accel, mg, "mg")] {
-                @for (i, axis) in AXES.iter().enumerate() { tr {
-                    td { (name) " " (axis) }
-                    @for (mean, sigma) in [(&triad.before, &triad.sigma_before), (&triad.after, &triad.sigma_after)] {
-                        td.n { @if triad.trimmed { (format!("{:+.4} ± {:.4} {unit}", mean[i] * factor, sigma[i] * factor)) } @else { "kept" } }
-                    }
-                } }
-            }
-        }))
-        @if !found.triads.accel.trimmed { p { "the accelerometer's offsets are unchanged, because its pose was not given (--up +z --gravity 9.81)" } }
-        (all_warnings(&found.warnings))
     })
 }

@@ -6,10 +6,7 @@ mod tables;
 use maud::{Markup, html};
 use mimu::quantity::{p_value, plural, plus_minus, significant};
 use mimu_fleet::Fleet;
-use mimu_fleet::result::{
-    ChangedLevel, ChangedUnit, ChartOfParameter, DifferentLevel, GageOfParameter, GageStudy,
-    Stranger,
-};
+use mimu_fleet::result::{ChangedLevel, ChangedUnit, ChartOfParameter, DifferentLevel, Stranger};
 
 use super::page::{Level, Made, contents, judged, page, spoken};
 use super::terminal::text;
@@ -54,7 +51,6 @@ fn document(fleet: &Fleet, level: Level, made: Option<&Made>) -> Markup {
                 ("labels", "Labels", !fleet.labels.is_empty()),
                 ("drift", "Drift of production", true),
                 ("population", "Population", true),
-                ("gage", "Repeatability and reproducibility", fleet.gage.is_some()),
                 ("capability", "Capability", fleet.part.is_some()),
             ]))
         }
@@ -77,11 +73,6 @@ fn document(fleet: &Fleet, level: Level, made: Option<&Made>) -> Markup {
             h2 { "Population" }
             (tables::spreads(fleet))
             (lists(fleet))
-        }
-        @if let Some(gage) = &fleet.gage {
-            @if level.has_all() { h2 id="gage" { "Repeatability and reproducibility" } }
-            p { (gage_line(gage)) @if let Some(worst) = worst(gage).filter(|_| level == Level::Summary) { "; " (worst) } }
-            @if level.has_all() { (tables::gage(gage)) }
         }
         @if let Some(part) = &fleet.part { (capability(fleet, part, level)) }
         @if let Some(made) = made { (made.line(&fleet.tool)) }
@@ -162,33 +153,6 @@ fn changed(one: &ChangedLevel) -> Markup {
 
 fn changed_unit(one: &ChangedUnit) -> Markup {
     html! { (one.unit) ", measured " (plural(one.measurements as u64, "time")) ": " (since(&one.chart)) }
-}
-
-fn gage_line(gage: &GageStudy) -> Markup {
-    let [all, used] = gage.units;
-    html! {
-        "repeatability and reproducibility: " @if all != used { (used) " of " } (plural(all as u64, "unit"))
-        " with " (plural(gage.measurements as u64, "calibration")) ", "
-        @if gage.factors.is_empty() { "no operator, fixture or day changes within a unit" } @else { "by " (gage.factors.join(", ")) }
-    }
-}
-
-/// The parameter whose measurement has the largest share of the tolerance, or else of the variation.
-fn worst(gage: &GageStudy) -> Option<String> {
-    let all = || gage.parameters.iter();
-    let by_tolerance = all().filter_map(|p| Some((p, p.share_of_tolerance?, "tolerance")));
-    let by_variation = all().map(|p| (p, p.share_of_variation, "variation"));
-    type Share<'a> = (&'a GageOfParameter, f64, &'a str);
-    let largest = |a: &Share, b: &Share| a.1.total_cmp(&b.1);
-    let worst = by_tolerance
-        .max_by(largest)
-        .or_else(|| by_variation.max_by(largest));
-    let (worst, share, of) = worst?;
-    let name = parameter(worst.sensor, &worst.name);
-    Some(format!(
-        "at most {} % of the {of} ({name})",
-        significant(100.0 * share)
-    ))
 }
 
 fn capability(fleet: &Fleet, part: &str, level: Level) -> Markup {

@@ -1,4 +1,4 @@
-//! The page of a unit: all results, in the order of a calibration certificate.
+//! The page of a unit: all results.
 
 pub(super) mod body;
 pub(super) mod curves;

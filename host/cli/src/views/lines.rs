@@ -1,13 +1,14 @@
-//! A session as lines of text, one for each event: for pipes, logs and small terminals.
+//! A session as lines of text, one for each event, with the present state below them on a terminal.
 
 use std::collections::BTreeSet;
 use std::io::Write;
 
+use indicatif::{ProgressBar, ProgressStyle};
 use mimu_equipment::step::sketch;
 use mimu_wizard::event::{Event, Question, SessionState, UserRequest, View};
 
 use super::answers::{Typed, of_yes};
-use crate::report;
+use crate::{hint, report};
 
 /// Number of final characters of a unit's name that identify it.
 const TAIL: usize = 6;
@@ -23,12 +24,18 @@ pub(crate) struct Lines {
     pub typed: Typed,
     pub yes: bool,
     asked: Option<Question>,
+    /// The present state, on a terminal only.
+    state: ProgressBar,
     /// Units that have sent a greeting. If there are several, lines name the unit.
     units: BTreeSet<String>,
 }
 
 impl Lines {
     pub(crate) fn new(typed: Typed, yes: bool) -> Self {
+        let state = ProgressBar::new_spinner();
+        if let Ok(style) = ProgressStyle::with_template("{wide_msg}") {
+            state.set_style(style);
+        }
         Self {
             text: None,
             events: None,
@@ -36,6 +43,7 @@ impl Lines {
             typed,
             yes,
             asked: None,
+            state,
             units: BTreeSet::new(),
         }
     }
@@ -55,9 +63,60 @@ impl Lines {
     fn say(&mut self, text: &str) {
         if let Some(out) = &mut self.text {
             // A reader that closed the pipe needs no more lines.
-            let _ = writeln!(out, "{text}").and_then(|()| out.flush());
+            let write = || writeln!(out, "{text}").and_then(|()| out.flush());
+            let _ = self.state.suspend(write);
         }
     }
+}
+
+impl Drop for Lines {
+    fn drop(&mut self) {
+        self.state.finish_and_clear();
+    }
+}
+
+/// The present state: of the first unit that waits, if any does.
+fn state_line(state: &SessionState) -> String {
+    let waiting = state.units.iter().find(|unit| unit.waiting.is_some());
+    let Some(unit) = waiting.or(state.units.first()) else {
+        return String::new();
+    };
+    let mut parts = Vec::new();
+    if let Some([gyro, accel]) = unit.motion {
+        let [most_gyro, most_accel] = unit.motion_limits;
+        parts.push(format!(
+            "motion: gyro {gyro:.2} of {most_gyro}, accel {accel:.2} of {most_accel}"
+        ));
+    }
+    if let Some(tilt) = unit.tilt_deg {
+        parts.push(format!("tilt {tilt:.1} of {} degrees", unit.tilt_limit_deg));
+    }
+    match (unit.rate_dps, state.step) {
+        (Some(rate), Some(step)) if step.rate_dps != 0.0 => {
+            parts.push(format!("{rate:+.1} of {:+.1} deg/s", step.rate_dps));
+        }
+        _ => {}
+    }
+    if let Some(spin) = &unit.spin {
+        let turns = spin.turns.unwrap_or_default();
+        parts.push(format!(
+            "{turns:.1} of {} turns about {}",
+            spin.asked, spin.axis
+        ));
+    }
+    if let (Some(temp_c), Some(trend), Some(limit)) = (
+        unit.temp_c,
+        unit.trend_c_per_min,
+        unit.trend_limit_c_per_min,
+    ) {
+        parts.push(format!("{temp_c:.1} °C, {trend:+.2} of {limit} °C/min"));
+    }
+    match (&unit.waiting, unit.left_s) {
+        (Some(why), _) => parts.push(format!("waits: {}", hint::of_waiting(why))),
+        (None, Some(left_s)) => parts.push(format!("measures, {left_s:.1} s left")),
+        (None, None) => {}
+    }
+    parts.join("; ")
 }
 
 /// An event as a line of JSON.
@@ -89,7 +148,11 @@ impl View for Lines {
         }
     }
 
-    fn show(&mut self, _: &SessionState) {}
+    fn show(&mut self, state: &SessionState) {
+        if self.text.is_some() {
+            self.state.set_message(state_line(state));
+        }
+    }
 
     fn request(&mut self) -> Option<UserRequest> {
         self.typed.request()
@@ -109,5 +172,43 @@ impl View for Lines {
             self.asked = None;
         }
         answer
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use mimu_equipment::step::Step;
+    use mimu_wizard::event::UnitState;
+    use mimu_wizard::waiting::Waiting;
+    use nalgebra::Vector3;
+
+    use super::*;
+
+    #[test]
+    fn the_state_is_that_of_the_unit_that_waits() {
+        let unit = UnitState {
+            motion: Some([0.5, 0.25]),
+            motion_limits: [1.0; 2],
+            tilt_deg: Some(3.0),
+            tilt_limit_deg: 10.0,
+            left_s: Some(2.5),
+            ..UnitState::default()
+        };
+        let mut state = SessionState {
+            step: Some(Step::at_rest(Vector3::z(), 5.0)),
+            units: vec![unit.clone(), unit],
+            ..SessionState::default()
+        };
+        let figures = "motion: gyro 0.50 of 1, accel 0.25 of 1; tilt 3.0 of 10 degrees";
+        assert_eq!(
+            state_line(&state),
+            format!("{figures}; measures, 2.5 s left")
+        );
+        state.units[1].waiting = Some(Waiting::TableMoves);
+        assert_eq!(
+            state_line(&state),
+            format!("{figures}; waits: the table moves")
+        );
+        assert_eq!(state_line(&SessionState::default()), "");
     }
 }

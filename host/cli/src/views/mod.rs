@@ -1,6 +1,4 @@
-//! Views of a wizard session: lines of text, JSON lines, or a full screen.
+//! A view of a wizard session: lines of text, JSON lines, and what the person types.
 
 pub(crate) mod answers;
 pub(crate) mod lines;
-pub(crate) mod picture;
-pub(crate) mod screen;

@@ -1,4 +1,4 @@
-//! `mimu accept`, from its arguments to its exit status: recordings of the bench, boards that write lines, and the golden unit.
+//! `mimu accept`, from its arguments to its exit status: recordings of the bench, and boards that write lines.
 #![cfg(unix)]
 
 use std::fmt::Write as _;
@@ -337,46 +337,6 @@ fn boards_at_several_ports_are_measured_together() {
         "accept --port tcp://127.0.0.1:1 --text --limits limits.toml --gravity 9.8",
     );
     assert_eq!(nobody.status, Some(1), "{}", nobody.stdout);
-}
-
-#[test]
-fn a_shift_is_measured_only_if_the_golden_unit_has_not_moved() {
-    let folder = place();
-    let unit = |name: &str, unit: &Unit, seed| {
-        record(folder.path(), name, "golden", &rows(unit, &[UP], 6.0, seed));
-    };
-    let accept = |name: &str, more: &str| {
-        let arguments = format!("accept {name} --limits limits.toml --golden golden.json{more}");
-        mimu(folder.path(), &arguments)
-    };
-    let none = accept("good", "");
-    assert!(none.stderr.contains("--new-golden"), "{}", none.stderr);
-    for seed in 20..25 {
-        unit("g", &GOOD, seed);
-        let ran = accept("g", if seed == 20 { " --new-golden" } else { "" });
-        assert_eq!(ran.status, Some(0), "{}{}", ran.stdout, ran.stderr);
-    }
-    unit("g", &GOOD, 30);
-    let ran = accept("g", "");
-    says(&ran.stderr, &["agrees with its history"]);
-    assert_eq!(accept("good", "").status, Some(0));
-    // Times are in whole seconds.
-    std::thread::sleep(Duration::from_millis(1100));
-    let late = accept("good", " --shift 1ms");
-    assert_eq!(late.status, Some(1));
-    assert!(late.stderr.contains("a check holds for"), "{}", late.stderr);
-    // It aged: its offset moved by 0.8 deg/s, within the limits of the product.
-    let aged = Unit {
-        gyro_z_dps: 1.2,
-        ..GOOD
-    };
-    unit("g", &aged, 31);
-    let moved = accept("g", "");
-    assert_eq!(moved.status, Some(1), "{}", moved.stdout);
-    says(&moved.stderr, &["gyro_z_offset by 0.8"]);
-    let refused = accept("good", "");
-    assert_eq!(refused.status, Some(1), "{}", refused.stdout);
-    assert!(refused.stderr.contains("had moved"), "{}", refused.stderr);
 }
 
 #[test]

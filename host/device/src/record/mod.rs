@@ -6,7 +6,6 @@
 mod clock;
 mod known;
 mod line;
-mod procedure;
 mod run;
 mod steps;
 
@@ -19,7 +18,6 @@ use serde::{Serialize, Serializer};
 
 pub use crate::reading::shortest;
 pub use known::Known;
-pub use procedure::Procedure;
 pub use steps::Steps;
 
 use crate::flagged::Flagged;
@@ -42,8 +40,6 @@ pub struct RecordOptions {
     pub steps: Steps,
     /// How long to wait for a port that has vanished. With zero the recording ends at once.
     pub reconnect: Duration,
-    /// Whether it ends when the device loses its power, because later samples belong to another power-on.
-    pub one_power_on: bool,
     /// Whether every dwell has a known input. The reference is then a table.
     pub table: bool,
     /// Name of the unit; without it, the number of its microcontroller.
@@ -63,8 +59,6 @@ pub struct UserRequest {
     pub end: bool,
     /// How many times a dwell was to begin, or the running one to end.
     pub marks: u32,
-    /// A dwell to discard.
-    pub drop: Option<i32>,
 }
 
 /// State of a recording.
@@ -94,14 +88,8 @@ pub struct RecordingState {
     /// The port has vanished, and is awaited.
     #[serde(skip)]
     pub waiting: bool,
-    /// Discarded dwells: incomplete turns, and dwells whose input differs from the planned one.
+    /// Discarded dwells: incomplete turns.
     pub dropped: Vec<i32>,
-    /// The recording has ended and is about to be written. The unit need not move any more.
-    #[serde(skip)]
-    pub ended: bool,
-    /// Mean of the last batch: gyro, accelerometer.
-    #[serde(skip)]
-    pub raw: [f64; 6],
     /// The last temperature, °C.
     pub temp_c: f64,
     /// Faults that the device flags.
@@ -152,8 +140,6 @@ pub fn record(
     let mut manifest = manifest(&who, raw_unit, options, known.as_ref());
     let mut run = Run::begin(session, options, known, &manifest)?;
     let ended = run.receive(session, options, &mut look);
-    run.state.ended = true;
-    run.asks_to_end(&mut look);
     run.drop_open_turn();
     run.state.line = run.line.total(session.count());
     run.state.waiting = false;

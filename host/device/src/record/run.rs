@@ -36,7 +36,6 @@ pub(super) struct Run {
     /// Starts of the device since its last power failure.
     pub starts: u32,
     pub line: line::LineTotals,
-    pub one_power_on: bool,
 }
 
 impl Run {
@@ -67,7 +66,6 @@ impl Run {
             asked: Instant::now(),
             unit_id: who.unit_id.clone(),
             starts: who.starts,
-            one_power_on: options.one_power_on,
             // A program that was killed may have left half a frame.
             line: line::LineTotals::from(session.count()),
         })
@@ -105,7 +103,6 @@ impl Run {
         for _ in 0..request.marks {
             self.steps.mark();
         }
-        self.drop_step(request.drop);
         request.end
     }
 
@@ -271,10 +268,6 @@ impl Run {
             self.drop_step(Some(step).filter(|step| self.is_turn(*step)));
         }
         if let Some(start) = arrival.restart {
-            if self.one_power_on && lost_power(&start) {
-                let at_s = seconds(first_ns);
-                return Err(cut_short(port, start, at_s));
-            }
             self.state.restarts.push(Restart {
                 t_s: seconds(first_ns),
                 start: start.map_or("its greeting was lost".into(), |s: Started| s.to_string()),
@@ -318,7 +311,6 @@ impl Run {
         }
         self.growing.write(&batch)?;
         let state = &mut self.state;
-        state.raw = std::array::from_fn(|i| batch.raw[i].iter().sum::<f64>() / count as f64);
         state.samples += count as u64;
         state.temp_c = shortest(samples.head.temp_c);
         state.flagged.count(samples.head.flags, count as u64);
@@ -326,23 +318,4 @@ impl Run {
         state.last_s = batch.t_s.last().copied();
         Ok(())
     }
-}
-
-/// Whether power may have been lost before a start.
-fn lost_power(start: &Option<Started>) -> bool {
-    matches!(
-        start,
-        None | Some(Started::PowerOn | Started::Other | Started::NotKnown)
-    )
-}
-
-fn cut_short(port: &str, start: Option<Started>, at_s: f64) -> Error {
-    let why = start.map_or("its greeting was lost".into(), |s| s.to_string());
-    Error::device(
-        port,
-        format!(
-            "the device restarted ({why}) before {at_s:.1} s, but a recording has one power-on"
-        ),
-        "check the supply, and record the rest as another one: `mimu thermal fit` takes several",
-    )
 }

@@ -1,4 +1,4 @@
-//! A text connection to a table or a chamber, over TCP or a serial port.
+//! A text connection to a table, over TCP or a serial port.
 
 use std::io::{BufRead as _, BufReader, Write};
 use std::time::{Duration, Instant};

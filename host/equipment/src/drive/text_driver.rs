@@ -1,19 +1,18 @@
-//! A table or a chamber with text commands.
+//! A table with text commands.
 
 use std::path::Path;
 use std::time::Duration;
 
-use mimu::plan::{TableAxis, Turn};
 use mimu_recording::ReferenceError;
 use mimu_recording::error::{Error, Result};
 use nalgebra::Vector3;
 
-use super::file::{Chamber, Command, DriverFile, Question};
+use super::Driver;
+use super::file::{Command, DriverFile, Question};
 use super::line::Line;
-use super::{Abilities, Driver};
 use crate::step::Step;
 
-/// A table or a chamber, or both, with text commands over TCP or a serial port.
+/// A table with text commands over TCP or a serial port.
 pub struct TextDriver {
     place: String,
     file: DriverFile,
@@ -41,7 +40,7 @@ impl TextDriver {
             (None, Some(port)) => Line::open(port, file.baud, timeout)?,
             _ => {
                 let problem = "it needs one of tcp and serial";
-                let remedy = "give the address or the port of the table or the chamber";
+                let remedy = "give the address or the port of the table";
                 return Err(Error::new(place, problem, remedy));
             }
         };
@@ -51,24 +50,6 @@ impl TextDriver {
             line,
             then: None,
         })
-    }
-
-    /// Like [`Self::open`], but refuses a driver that cannot move the unit.
-    pub fn open_table(path: &Path) -> Result<Self> {
-        let driver = Self::open(path)?;
-        match driver.file.to_pose {
-            Some(_) => Ok(driver),
-            None => Err(driver.lacks("`move`")),
-        }
-    }
-
-    fn lacks(&self, what: &str) -> Error {
-        let problem = format!("it has no {what}");
-        Error::new(
-            &self.place,
-            problem,
-            "docs/wizard/driver.md has all keys of a driver file",
-        )
     }
 
     fn command(&mut self, command: &Command, values: &[(&str, f64)]) -> Result<()> {
@@ -139,23 +120,18 @@ impl Driver for TextDriver {
             return Ok(None);
         };
         let free = self.is(&question)?;
-        let whose = match self.file.to_pose {
-            Some(_) => "table",
-            None => "chamber",
-        };
-        Ok((!free).then(|| format!("the interlock of the {whose} is open")))
+        Ok((!free).then(|| "the interlock of the table is open".into()))
     }
 
     fn go(&mut self, step: &Step) -> Result<()> {
         let (middle, _) = angles(&step.up());
-        if let Some(problem) = self.file.limits.beyond(step.rate_dps, middle, 0.0) {
+        if let Some(problem) = self.file.limits.beyond(step.rate_dps, middle) {
             let remedy = "leave this dwell out, or correct [limits]";
             return Err(Error::new(&self.place, problem, remedy));
         }
         self.not_held()?;
         self.stop()?;
         let to_pose = self.file.to_pose.clone();
-        let to_pose = to_pose.ok_or_else(|| self.lacks("`move`"))?;
         self.command(&to_pose, &values(step))?;
         if step.rate_dps != 0.0 {
             if self.file.rate.is_none() {
@@ -198,85 +174,5 @@ impl Driver for TextDriver {
         self.command(&power.off, &[])?;
         self.command(&power.on, &[])?;
         Ok(true)
-    }
-
-    fn abilities(&self) -> Abilities {
-        let axes = [TableAxis::Outer, TableAxis::Middle, TableAxis::Inner];
-        let turns = axes.into_iter().filter(|a| self.file.turn.of(*a).is_some());
-        Abilities {
-            place: self.place.clone(),
-            moves: self.file.to_pose.is_some(),
-            rates: self.file.rate.is_some(),
-            turns: turns.collect(),
-            limits: self.file.limits,
-            chamber: self.file.chamber.as_ref().map(Chamber::limits),
-        }
-    }
-
-    fn turn(&mut self, turn: &Turn) -> Result<()> {
-        self.not_held()?;
-        let command = self.file.turn.of(turn.axis).cloned();
-        let command = command.ok_or_else(|| self.lacks(&format!("turn.{}", turn.axis.name())))?;
-        let [x, y, z] = turn.to_up;
-        let [middle, inner] = turn.to_deg;
-        let values = [
-            ("turn_deg", turn.angle_deg),
-            ("turn_dps", turn.rate_dps),
-            ("x", x),
-            ("y", y),
-            ("z", z),
-            ("middle_deg", middle),
-            ("inner_deg", inner),
-        ];
-        self.command(&command, &values)
-    }
-
-    fn set_chamber(&mut self, temp_c: f64) -> Result<()> {
-        let set = self.file.chamber.as_ref().map(|c| c.set.clone());
-        let set = set.ok_or_else(|| self.lacks("[chamber]"))?;
-        self.command(&set, &[("temp_c", temp_c)])
-    }
-
-    fn chamber_c(&mut self) -> Result<Option<f64>> {
-        let Some(ask) = self.file.chamber.as_ref().and_then(|c| c.read.clone()) else {
-            return Ok(None);
-        };
-        self.line.say(&ask)?;
-        let answer = self.line.answer(&ask)?;
-        match first_number(&answer) {
-            Some(temp_c) => Ok(Some(temp_c)),
-            None => {
-                let problem = format!("its answer {answer:?} to {ask:?} contains no number");
-                Err(Error::device(
-                    &self.line.name,
-                    problem,
-                    "correct [chamber] read",
-                ))
-            }
-        }
-    }
-}
-
-/// The first number in a line, as 23.4 in `T=23.4 C`.
-fn first_number(text: &str) -> Option<f64> {
-    let of_number = |c: char| c.is_ascii_digit() || "+-.eE".contains(c);
-    let mut words = text.split(|c| !of_number(c));
-    words.find_map(|word| word.parse().ok().filter(|x: &f64| x.is_finite()))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::first_number;
-
-    #[test]
-    fn a_temperature_is_found_among_words() {
-        for (text, temp_c) in [
-            ("23.4", Some(23.4)),
-            ("T=-10.25 degC", Some(-10.25)),
-            ("OK, +7", Some(7.0)),
-            ("ERR", None),
-        ] {
-            assert_eq!(first_number(text), temp_c, "{text}");
-        }
     }
 }

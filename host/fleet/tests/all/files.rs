@@ -7,9 +7,9 @@ use mimu::calibration::Calibration;
 use mimu::data_sheet::Part;
 use mimu::triad::{Part as OfCovariance, Triad};
 use mimu::{RawUnit, Reference, Sensor};
+use mimu_fleet::fleet;
 use mimu_fleet::labels::LabelTable;
 use mimu_fleet::tree::{Measurement, Search, Tree};
-use mimu_fleet::{Options, fleet};
 
 use crate::plant::Plant;
 
@@ -171,7 +171,7 @@ fn calibrations_of_other_readings_and_misfits_are_left_out_with_their_reason() {
         "\n[judgement]\nkind = \"misfit\"\nreason = \"the error is 3 m/s²\"\n\n[recording]",
     );
     write(&folder.path().join("misfit.toml"), &misfit);
-    let result = fleet(read(folder.path(), None, None), None, &Options::default()).unwrap();
+    let result = fleet(read(folder.path(), None, None), None).unwrap();
     assert_eq!((result.units, result.left_out.len()), (12, 2));
     let reason = |name: &str| {
         result
@@ -193,9 +193,7 @@ fn calibrations_of_other_readings_and_misfits_are_left_out_with_their_reason() {
         "{}",
         reason("misfit.toml")
     );
-    let few = fleet(Tree::default(), None, &Options::default())
-        .unwrap_err()
-        .to_string();
+    let few = fleet(Tree::default(), None).unwrap_err().to_string();
     assert!(few.contains("0 comparable units"), "{few}");
 }
 
@@ -217,7 +215,7 @@ fn capability_is_that_of_the_values_in_the_files() {
                 * (m.of.triads.gyro.unwrap().0[0] / (16.4f64 * 180.0 / std::f64::consts::PI) - 1.0)
         })
         .collect();
-    let result = fleet(tree, Some(&part), &Options::default()).unwrap();
+    let result = fleet(tree, Some(&part)).unwrap();
     let mean = values.iter().sum::<f64>() / 60.0;
     let sigma = (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / 59.0).sqrt();
     let found = result

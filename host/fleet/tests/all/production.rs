@@ -3,12 +3,12 @@
 use std::time::Instant;
 
 use mimu::JudgementKind;
-use mimu_fleet::{Fleet, Options, fleet};
+use mimu_fleet::{Fleet, fleet};
 
 use crate::plant::{Faults, Plant, processor_time};
 
 fn result(plant: &Plant) -> Fleet {
-    fleet(plant.tree(), None, &Options::default()).unwrap()
+    fleet(plant.tree(), None).unwrap()
 }
 
 /// Names of everything that is found.
@@ -149,52 +149,6 @@ fn strangers_are_named_with_what_shows_them() {
 }
 
 #[test]
-fn operators_and_repetitions_are_separated_from_units() {
-    let fleet = result(&Plant {
-        repeated: 30,
-        operator: 0.3,
-        repetition: 0.2,
-        fit: 0.1,
-        ..Plant::new(300, 4)
-    });
-    let gage = fleet.gage.as_ref().unwrap();
-    assert_eq!((gage.units, gage.measurements), ([30, 30], 180));
-    assert_eq!(gage.factors, ["operator"]);
-    // 0.2 of repetitions and 0.1 to 0.2 of fits; three operators scatter themselves, so their mean over 21 parameters counts.
-    let sizes = |p: &mimu_fleet::result::GageOfParameter| {
-        let kinds = [
-            ("scale", 0),
-            ("misalignment", 1),
-            ("non_orthogonality", 2),
-            ("bias", 3),
-        ];
-        let kind = kinds.iter().find(|k| p.name.starts_with(k.0)).unwrap().1;
-        [crate::plant::GYRO, crate::plant::ACCEL][usize::from(p.sensor == mimu::Sensor::Accel)]
-            [kind]
-    };
-    let count = gage.parameters.len() as f64;
-    assert_eq!(count, 21.0);
-    let mean = |of: &dyn Fn(&mimu_fleet::result::GageOfParameter) -> f64| {
-        let squares = gage.parameters.iter().map(|p| (of(p) / sizes(p)).powi(2));
-        (squares.sum::<f64>() / count).sqrt()
-    };
-    let repeatability = mean(&|p| p.repeatability.value);
-    // The mean square of 2^u, u from -1 to 1, is 1.353.
-    let expected = (0.2f64.powi(2) + 1.353 * 0.1f64.powi(2)).sqrt();
-    assert!(
-        (repeatability / expected - 1.0).abs() < 0.05,
-        "{repeatability} {expected}"
-    );
-    let reproducibility = mean(&|p| p.reproducibility.value);
-    assert!(
-        (reproducibility / 0.3 - 1.0).abs() < 0.35,
-        "{reproducibility}"
-    );
-    let units = mean(&|p| p.between_units.value);
-    assert!((units - 1.0).abs() < 0.15, "{units}");
-}
-
-#[test]
 fn a_calibration_that_contradicts_five_others_of_its_unit_is_named_and_not_used() {
     let mut tree = Plant {
         repeated: 20,
@@ -205,7 +159,7 @@ fn a_calibration_that_contradicts_five_others_of_its_unit_is_named_and_not_used(
     .tree();
     let (values, _) = tree.measurements[8].of.triads.gyro.as_mut().unwrap();
     values[5] += 3.0 * crate::plant::GYRO[1];
-    let fleet = fleet(tree, None, &Options::default()).unwrap();
+    let fleet = fleet(tree, None).unwrap();
     let named: Vec<&str> = fleet
         .contradicting
         .iter()
@@ -274,7 +228,7 @@ fn ten_thousand_units_with_faults_and_without() {
     };
     let tree = plant.tree();
     let (begun, time) = (Instant::now(), processor_time());
-    let with = fleet(tree, None, &Options::default()).unwrap();
+    let with = fleet(tree, None).unwrap();
     println!(
         "10,000 units: {:.1} s of processor time, {:.1} s elapsed",
         processor_time() - time,

@@ -8,7 +8,6 @@ mod classic;
 mod coverage;
 mod estimates;
 mod judged;
-mod plan;
 #[path = "../../../../tests/thermal/points.rs"]
 mod points;
 mod refused;

@@ -1,4 +1,4 @@
-//! `mimu wizard` at a terminal: ports with their threads, driven tables, keyboard and screen.
+//! `mimu wizard` at a terminal: ports with their threads, driven tables, and keyboard.
 
 use std::io::{IsTerminal as _, Write};
 use std::path::Path;
@@ -10,7 +10,6 @@ use mimu_equipment::drive::{Driver, Person, TextDriver, Together};
 use mimu_recording::Parents;
 use mimu_recording::error::{Error, Result};
 use mimu_wizard::device::DeviceSource;
-use mimu_wizard::event::View;
 use mimu_wizard::session::{UnitSpec, run as carry_out};
 use mimu_wizard::source::{Opener, Source};
 use mimu_wizard::station::at_port;
@@ -23,7 +22,6 @@ use crate::output::{check_outputs, print};
 use crate::report;
 use crate::views::answers::Typed;
 use crate::views::lines::Lines;
-use crate::views::screen::Screen;
 
 impl TextArgs {
     /// Opens the board at this port, again at each call; without a port, the only one at which a device greets. `k` is its index if there are several,
@@ -90,15 +88,12 @@ const TABLE_STOPS: Duration = Duration::from_secs(15);
 
 /// Ends the program if the session does not react to the request: it may wait for a silent port or a diagnosis for half a minute. All completed work
 /// is on disk, and a device that is interrupted while storing keeps a complete calibration.
-fn end_in_time(stop: Arc<AtomicBool>, ends: Duration, on_screen: bool) -> Result<()> {
+fn end_in_time(stop: Arc<AtomicBool>, ends: Duration) -> Result<()> {
     let watch = move || {
         while !stop.load(Ordering::Relaxed) {
             std::thread::sleep(ENDS / 20);
         }
         std::thread::sleep(ends);
-        if on_screen {
-            ratatui::restore();
-        }
         eprintln!("ended; the same command resumes here");
         std::process::exit(130);
     };
@@ -113,11 +108,11 @@ pub(crate) fn run(args: &WizardArgs, command_line: &str) -> Result<()> {
     let wanted = args.wanted()?;
     let driver: Box<dyn Driver> = match args.drivers.as_slice() {
         [] => Box::new(Person),
-        [path] => Box::new(TextDriver::open_table(path)?),
+        [path] => Box::new(TextDriver::open(path)?),
         paths => {
-            let each = paths.iter().map(|path| -> Result<Box<dyn Driver>> {
-                Ok(Box::new(TextDriver::open_table(path)?))
-            });
+            let each = paths
+                .iter()
+                .map(|path| -> Result<Box<dyn Driver>> { Ok(Box::new(TextDriver::open(path)?)) });
             Box::new(Together(each.collect::<Result<_>>()?))
         }
     };
@@ -133,30 +128,22 @@ pub(crate) fn run(args: &WizardArgs, command_line: &str) -> Result<()> {
     };
     let stop = interruption()?;
     let quiet = args.json.is_standard_output();
-    let on_screen = !args.plain && !to_output && !quiet && Screen::fits();
     let ends = match args.drivers.is_empty() {
         true => ENDS,
         false => TABLE_STOPS,
     };
-    end_in_time(stop.clone(), ends, on_screen)?;
-    let mut view: Box<dyn View> = match on_screen {
-        true => Box::new(Screen::new(stop, args.yes, events)?),
-        false => {
-            let mut lines = Lines::new(Typed::new(stop)?, args.yes);
-            lines.sketches = driver.is_person() && std::io::stdout().is_terminal();
-            lines.events = events;
-            lines.text = match (to_output, quiet) {
-                (true, _) => Some(Box::new(std::io::stderr())),
-                (false, true) => None,
-                (false, false) => Some(Box::new(std::io::stdout())),
-            };
-            Box::new(lines)
-        }
+    end_in_time(stop.clone(), ends)?;
+    let mut lines = Lines::new(Typed::new(stop)?, args.yes);
+    lines.sketches = driver.is_person() && std::io::stdout().is_terminal();
+    lines.events = events;
+    lines.text = match (to_output, quiet) {
+        (true, _) => Some(Box::new(std::io::stderr())),
+        (false, true) => None,
+        (false, false) => Some(Box::new(std::io::stdout())),
     };
     let page = super::page(command_line);
-    let outcome = complete(carry_out(config, wanted, driver, view.as_mut(), &page));
-    // The terminal is restored before anything is printed to it.
-    drop(view);
+    let outcome = complete(carry_out(config, wanted, driver, &mut lines, &page));
+    drop(lines);
     let outcome = outcome?;
     print(&args.json, &report::wizard_text(&outcome), &outcome, None)?;
     check_stored(&outcome, &args.output)

@@ -5,7 +5,7 @@ use mimu::quantity::{Sensor, p_value};
 use mimu::readable::{self, Readable};
 use mimu_fleet::Fleet;
 use mimu_fleet::capability::Capability;
-use mimu_fleet::result::{DifferentLevel, GageStudy, Stranger, TriadOfFleet};
+use mimu_fleet::result::{DifferentLevel, Stranger, TriadOfFleet};
 
 use crate::report::page::written;
 use crate::report::table::{interval, known, number, table};
@@ -103,25 +103,6 @@ pub(super) fn different(all: &[DifferentLevel]) -> Markup {
         td { (one.label) " " (one.level) } td { (p_value(one.p)) } td.n { (one.count) } td.n { (one.strangers) } td { (parameter(one.sensor, &one.parameter)) }
         td.n { (written(&signed(one.parameter_unit, one.change))) } (number(one.sigmas.abs(), 1.0))
     } } })) }
-}
-
-/// Repeatability and reproducibility.
-pub(super) fn gage(study: &GageStudy) -> Markup {
-    let tolerance = study
-        .parameters
-        .iter()
-        .any(|p| p.share_of_tolerance.is_some());
-    let caption = "Standard deviations: repeatability and that of a fit in it, reproducibility, both together (the measurement), and between units; the measurement in shares of the whole variation and, six-fold, of the tolerance";
-    html! { (table(caption, &html! {
-        th { "1 σ" } @for head in ["repeatability", "of the fit", "reproducibility", "measurement", "units", "% variation"] { th.n { (head) } } @if tolerance { th.n { "% tolerance" } }
-    }, &html! { @for p in &study.parameters {
-        @let Readable { factor, unit } = readable(&p.unit);
-        tr {
-            td { (parameter(p.sensor, &p.name)) ", " (unit) }
-            @for sigma in [p.repeatability.value, p.fit_sigma, p.reproducibility.value, p.measurement.value, p.between_units.value] { (number(sigma, factor)) }
-            (number(p.share_of_variation, 100.0)) @if tolerance { (known(p.share_of_tolerance, 100.0)) }
-        }
-    } })) }
 }
 
 /// Indices of capability.

@@ -13,7 +13,6 @@ mod ports;
 mod recording;
 mod temperature;
 pub(crate) mod terminal;
-mod thermal_record;
 
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};

@@ -5,5 +5,4 @@ pub mod bench;
 pub mod on_board;
 mod playback;
 mod relayed;
-mod screen;
 mod text;

@@ -1,4 +1,4 @@
-//! `mimu wizard` with a board of another maker, which writes lines of text into a pseudo-terminal; and its full screen.
+//! `mimu wizard` with a board of another maker, which writes lines of text into a pseudo-terminal.
 
 use std::fmt::Write as _;
 use std::path::Path;
