@@ -69,6 +69,10 @@ ask record record -o "$work/rest" --for "${seconds}s" --gravity 9.81
 json "$work/record.json" "r['missing'] == 0 and r['gaps'] == 0 and not r['restarts'] and not r['broken_off']"
 json "$work/record.json" "r['samples'] == round($seconds * 1000) and r['saturated'] == 0 and r['without_reference'] == 0 and not any(r['temperature_left_out'])"
 
+step "the Kalman bank on the device and on the PC, on the same samples"
+ask kalman device kalman --force-mps2 0,0,9.81 --for 5s </dev/null
+json "$work/kalman.json" "r['largest_distance_sigma'] < 0.1 and r['rejected'] == 0"
+
 if [ -n "$calibration" ]; then
   step "a calibration up and down"
   ask upload device upload "$calibration"

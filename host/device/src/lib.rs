@@ -18,12 +18,14 @@
 //! | `reading`         | single-precision readings as short decimal numbers                       |
 //! | [`record`]        | records the raw stream                                                   |
 //! | `result`          | a command's result with port and command, as written in JSON             |
+//! | `kalman`          | compares the device's Kalman bank with the PC's on the same samples      |
 
 mod check;
 mod contents;
 mod flagged;
 mod identity;
 mod image;
+mod kalman;
 mod line;
 mod origin;
 mod port;
@@ -42,6 +44,7 @@ pub use contents::{Contents, Inverse, NodeContents, calibration, contents};
 pub use flagged::Flagged;
 pub use identity::{Hash, Identity, Room, Started, StoredCalibration, TriadInfo, unit_name};
 pub use image::Image;
+pub use kalman::{Applied, AxisEstimate, Converging, KalmanPlan, KalmanRun, SHORTEST, kalman};
 pub use port::{BAUD, Port, Ports, SerialPair, ports, serial_pair};
 pub use received::{Answer, Event, LineCount, Received, Receiver, Samples};
 pub use result::{Counted, DeviceResult};

@@ -45,6 +45,8 @@ enum DeviceCommand {
     Counters(CountersArgs),
     /// Compare its compensated stream with the PC's compensation of its raw stream
     Check(comparison::CheckArgs),
+    /// Run its Kalman bank with known inputs and compare it with the PC's on the same samples
+    Kalman(comparison::KalmanArgs),
 }
 
 #[derive(Args)]
@@ -147,6 +149,7 @@ pub fn run(args: &DeviceArgs) -> Result<()> {
         DeviceCommand::SelfTest(args) => run_self_test(args),
         DeviceCommand::Counters(args) => counters(args),
         DeviceCommand::Check(args) => comparison::run_check(args),
+        DeviceCommand::Kalman(args) => comparison::run_kalman(args),
     }
 }
 

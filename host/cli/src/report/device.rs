@@ -5,8 +5,8 @@ use mimu::quantity::{AXES, Sensor, plural, significant};
 use mimu::readable::STANDARD_GRAVITY;
 use mimu_device::record::RecordSummary;
 use mimu_device::{
-    Checked, Contents, Counted, DeviceResult, Identity, LineCount, SelfTested, Streamed, Uploaded,
-    Verdict,
+    Checked, Contents, Counted, DeviceResult, Identity, KalmanRun, LineCount, SelfTested, Streamed,
+    Uploaded, Verdict,
 };
 
 use super::page::all_warnings;
@@ -228,5 +228,24 @@ pub fn check_text(result: &DeviceResult<Checked>) -> String {
         @if found.holds { p { "device and PC agree to rounding" } }
         @else if !found.not_judged_for.is_empty() { p { "not judged: " (found.not_judged_for.join(", ")) " depends on temperatures before the comparison" } }
         @else { p { "device and PC DIFFER" } }
+    })
+}
+
+/// Result of `mimu device kalman`.
+pub fn kalman_text(result: &DeviceResult<KalmanRun>) -> String {
+    let run = &result.found;
+    text(&html! {
+        p { (result.port) ": Kalman bank of the " (run.triad) ", forward model u = P x + b, " (run.direction) }
+        @for applied in &run.inputs {
+            @let [x, y, z] = applied.input;
+            p { (format!("input {x:>9} {y:>9} {z:>9} {}   samples {} to {}", run.input_unit, applied.first, applied.last)) }
+        }
+        (table("Estimates of the device and of the PC", &html! { th {} th.n { "device" } th.n { "sigma" } th.n { "PC" } th.n { "difference / sigma" } th { "unit" } }, &html! {
+            @for (i, axis) in AXES.iter().enumerate() { @for (k, (name, unit)) in run.parameters.iter().zip(&run.units).enumerate() { tr {
+                td { (axis) " " (name) } td.n { (format!("{:.7}", run.device[i].mean[k])) } (number(run.device[i].sigma[k], 1.0))
+                td.n { (format!("{:.7}", run.host[i].mean[k])) } (number(run.distance_sigma[i][k], 1.0)) td { (unit) }
+            } } }
+        }))
+        p { "largest difference " (significant(run.largest_distance_sigma)) " sigma; samples rejected: " (run.rejected) }
     })
 }

@@ -185,6 +185,23 @@ fn a_session_from_the_greeting_to_the_counters() {
         }
     }
 
+    let force = format!("0,0,{GRAVITY}");
+    let filtered = bench.json(
+        &place,
+        &["device", "kalman", "--force-mps2", &force, "--for", "1s"],
+    );
+    let distance = filtered["largest_distance_sigma"].as_f64().unwrap();
+    assert!(distance < 0.05, "{distance}");
+    for i in 0..3 {
+        // One input determines one combination: the sensor's reading under it.
+        let mean: Vec<f64> = (0..4)
+            .map(|k| filtered["device"][i]["mean"][k].as_f64().unwrap())
+            .collect();
+        let reads = mean[0] + GRAVITY * mean[3];
+        let wanted = (p * up + accel_v)[i];
+        assert!((reads - wanted).abs() < 3e-3, "{reads} V, not {wanted}");
+    }
+
     let counted = bench.json(&place, &["device", "counters"]);
     for name in [
         "late",
