@@ -88,7 +88,7 @@ enum Command {
     /// Record the raw stream of a device
     Record(record::RecordArgs),
     #[cfg(not(target_family = "wasm"))]
-    /// Control a device: info, stream, upload, download, self-test, counters, check, kalman
+    /// Control a device: info, stream, upload, download, trim, self-test, counters, check, kalman
     Device(device::DeviceArgs),
     /// Print the completion script of a shell
     Completions(cmd::completions::CompletionsArgs),

@@ -44,7 +44,7 @@ pub use compare::compare_text;
 pub use design::{design_text, next_text};
 pub use device::{
     check_text, counters_text, download_text, info_text, kalman_text, record_text, self_test_text,
-    stream_text, upload_text,
+    stream_text, trim_text, upload_text,
 };
 pub use diagnosis::{Detail, diagnosis_page, diagnosis_text, not_in_plan_text};
 pub use fit::{dwell_table, fit_text};

@@ -87,6 +87,24 @@ impl Image {
         })
     }
 
+    /// The image of bytes that were read from a device.
+    pub(super) fn stored_before(bytes: Vec<u8>) -> std::result::Result<Self, stored::StoredError> {
+        let (mut node_temp_c, mut effects) = (Vec::new(), Vec::new());
+        let stored = stored::read(
+            &bytes,
+            |node| node_temp_c.push(node.temp_c),
+            |effect| effects.push(effect.to_string()),
+        )?;
+        Ok(Self {
+            hash: Hash(stored::hash(&bytes)),
+            bytes,
+            origin: stored.origin,
+            node_temp_c,
+            effects,
+            warnings: Vec::new(),
+        })
+    }
+
     /// Refuses a calibration of another unit than the greeting's.
     pub fn check_unit(&self, who: &Identity, place: &str) -> Result<()> {
         let of = self.origin.unit_id.as_ref().map(origin::digits);

@@ -10,6 +10,7 @@
 //! | `origin`          | the unit, the date and the recording of a calibration                    |
 //! | `upload`          | sends a calibration and reads it back                                    |
 //! | `contents`        | contents of stored calibrations                                          |
+//! | `trim`            | corrects the offsets of the stored calibration while the unit is at rest |
 //! | `test_result`     | a row of the self-test                                                   |
 //! | `self_test`       | the self-test, and whether the unit was at rest during it                |
 //! | `flagged`         | counts samples that carry a flag                                         |
@@ -37,6 +38,7 @@ mod self_test;
 mod session;
 mod stream;
 mod test_result;
+mod trim;
 mod upload;
 
 pub use check::{Checked, Difference, check, rounding, ulps};
@@ -52,4 +54,5 @@ pub use self_test::{SelfTested, self_test};
 pub use session::{Session, refused};
 pub use stream::{Moments, Stream, Streamed, Thermometer, look, stream};
 pub use test_result::{TestResult, Verdict};
+pub use trim::{Pose, SHORTEST_TRIM_S, Trimmed, TrimmedTriad, trim};
 pub use upload::{Uploaded, download, outside_now, upload};

@@ -2,6 +2,7 @@
 
 mod comparison;
 mod transfer;
+mod trim;
 
 use std::io::Write as _;
 use std::sync::Arc;
@@ -39,6 +40,8 @@ enum DeviceCommand {
     Upload(transfer::UploadArgs),
     /// Fetch the stored calibration
     Download(transfer::DownloadArgs),
+    /// Correct the offsets of the stored calibration at today's temperature; the unit has to lie still
+    Trim(trim::TrimArgs),
     /// Deflect the sensors electrically and measure the deflection; the unit has to stand still
     SelfTest(PlainArgs),
     /// Show the counters: lost samples, garbled frames, flash errors
@@ -146,6 +149,7 @@ pub fn run(args: &DeviceArgs) -> Result<()> {
         DeviceCommand::Stream(args) => run_stream(args),
         DeviceCommand::Upload(args) => transfer::run_upload(args),
         DeviceCommand::Download(args) => transfer::run_download(args),
+        DeviceCommand::Trim(args) => trim::run_trim(args),
         DeviceCommand::SelfTest(args) => run_self_test(args),
         DeviceCommand::Counters(args) => counters(args),
         DeviceCommand::Check(args) => comparison::run_check(args),

@@ -6,7 +6,7 @@ use mimu::readable::STANDARD_GRAVITY;
 use mimu_device::record::RecordSummary;
 use mimu_device::{
     Checked, Contents, Counted, DeviceResult, Identity, KalmanRun, LineCount, SelfTested, Streamed,
-    Uploaded, Verdict,
+    Trimmed, Uploaded, Verdict,
 };
 
 use super::page::all_warnings;
@@ -247,5 +247,27 @@ pub fn kalman_text(result: &DeviceResult<KalmanRun>) -> String {
             } } }
         }))
         p { "largest difference " (significant(run.largest_distance_sigma)) " sigma; samples rejected: " (run.rejected) }
+    })
+}
+
+/// Result of `mimu device trim`.
+pub fn trim_text(result: &DeviceResult<Trimmed>) -> String {
+    let found = &result.found;
+    // rad/s is shown as deg/s, m/s² as mg.
+    let (deg, mg) = (1_f64.to_degrees(), 1e3 / STANDARD_GRAVITY);
+    text(&html! {
+        p { (result.port) (format!(": trimmed at {:.1} °C: stored {} (read back); before: {}", found.temp_c, found.hash, found.before)) }
+        (table("", &html! { th {} th.n { "before" } th.n { "after" } th { (format!("means of {:.0} s and their standard deviations", found.averaged_s)) } }, &html! {
+            @for (name, triad, factor, unit) in [("gyro", &found.triads.gyro, deg, "deg/s"), ("accel", &found.triads.accel, mg, "mg")] {
+                @for (i, axis) in AXES.iter().enumerate() { tr {
+                    td { (name) " " (axis) }
+                    @for (mean, sigma) in [(&triad.before, &triad.sigma_before), (&triad.after, &triad.sigma_after)] {
+                        td.n { @if triad.trimmed { (format!("{:+.4} ± {:.4} {unit}", mean[i] * factor, sigma[i] * factor)) } @else { "kept" } }
+                    }
+                } }
+            }
+        }))
+        @if !found.triads.accel.trimmed { p { "the accelerometer's offsets are unchanged, because its pose was not given (--up +z --gravity 9.81)" } }
+        (all_warnings(&found.warnings))
     })
 }
