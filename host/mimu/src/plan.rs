@@ -226,7 +226,7 @@ impl Plan {
     pub fn read(path: &Path) -> Result<Self> {
         let place = path.display().to_string();
         let text = read_text(path)?;
-        let again = "write the plan with `mimu design`, or copy one of rig/plans";
+        let again = "write the plan with `mimu design` or `mimu thermal plan`";
         check_kind(&text, &place, "mimu-plan")?;
         let plan: Self = parse_toml(&text, &place, Some(again))?;
         if !(1..=MOST_DWELLS).contains(&(plan.rounds as usize)) {
@@ -239,7 +239,7 @@ impl Plan {
             return Err(Error::new(
                 place,
                 problem,
-                "name a plan of `mimu design`, or one like those of rig/plans",
+                "name a plan of `mimu design` or `mimu thermal plan`",
             ));
         }
         Ok(plan)

@@ -18,6 +18,7 @@
 //! | [`judge`] | errors of dwells, by temperature, separately for heating and cooling |
 //! | [`mod@fit`], [`extrapolation`] | curves, judged; whether there is curvature at all |
 //! | [`judgement`] | the judgement of such a fit |
+//! | [`plan`] | procedures in chamber and table, and how well the curves are known afterwards |
 //! | [`result`] | the result, as written to JSON |
 //! | [`warning`] | warnings for people |
 
@@ -38,6 +39,7 @@ pub mod judgement;
 pub mod nodes;
 pub mod noise;
 pub mod path;
+pub mod plan;
 pub mod profile;
 mod reference_error;
 pub mod regression;

@@ -1,5 +1,7 @@
 //! `mimu thermal`.
 
+mod plan;
+
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
@@ -31,6 +33,8 @@ pub(crate) struct ThermalArgs {
 enum ThermalCommand {
     /// Estimate all parameters over temperature, and the lag of the dies behind the thermometer
     Fit(Box<FitArgs>),
+    /// Plan a procedure; prints its duration and the expected uncertainty of the curves
+    Plan(plan::PlanArgs),
 }
 
 /// Arguments of `mimu thermal fit`.
@@ -108,8 +112,11 @@ const MISFIT: &str =
     "look for jumps and moves in the plot and leave those parts out, or write it all the same";
 
 pub(crate) fn run(args: &ThermalArgs, command_line: &str) -> Result<Status> {
-    let ThermalCommand::Fit(args) = &args.command;
-    run_fit(args, command_line)
+    let done = |()| Status::Done;
+    match &args.command {
+        ThermalCommand::Fit(args) => run_fit(args, command_line),
+        ThermalCommand::Plan(args) => plan::run(args).map(done),
+    }
 }
 
 fn run_fit(args: &FitArgs, command_line: &str) -> Result<Status> {

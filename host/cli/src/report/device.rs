@@ -10,6 +10,7 @@ use mimu_device::{
 };
 
 use super::page::all_warnings;
+use super::table::{number, table};
 use super::terminal::text;
 
 /// Result of `mimu device info`.

@@ -23,4 +23,5 @@ mod pocket_calculator;
 mod random;
 mod readme;
 mod thermal_command;
+mod thermal_plan_command;
 mod wizard;

@@ -8,6 +8,7 @@ mod classic;
 mod coverage;
 mod estimates;
 mod judged;
+mod plan;
 #[path = "../../../../tests/thermal/points.rs"]
 mod points;
 mod refused;

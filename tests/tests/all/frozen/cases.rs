@@ -590,6 +590,8 @@ fn designs(cases: &mut Cases) {
         "design --sensor gyro -n 14 --rates 50,200",
         "design --table hand -n 14",
         "design --effects gyro_g_sensitivity,accel_scale_quadratic",
+        "thermal plan --procedure soak --range=-10..50",
+        "thermal plan --procedure ramp --range=-10..50",
     ] {
         cases.add("design", arguments, move |bench| {
             bench.mimu(arguments);
