@@ -216,6 +216,14 @@ impl Plan {
         self
     }
 
+    /// The same with a time before the first dwell, s, and so many rounds; `round_s` from one to the next, if the table waits for it.
+    pub fn in_rounds(mut self, lead_in_s: f64, rounds: u32, round_s: Option<f64>) -> Self {
+        self.lead_in_s = round(lead_in_s, 1e3);
+        self.rounds = rounds;
+        self.round_s = round_s.map(|s| round(s, 1e3));
+        self
+    }
+
     /// Text of the file; `about` is put in front as a comment, line by line.
     pub fn to_toml(&self, about: &str) -> String {
         let about: String = about.lines().map(|line| format!("# {line}\n")).collect();

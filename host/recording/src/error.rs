@@ -88,6 +88,10 @@ arguments! {
     SignedLowByte, "--signed-low-byte", "Columns whose low byte a firmware took for a signed number.";
     Force, "--force", "Writing a calibration that is judged a misfit.";
     Base, "--base", "The calibration at one temperature that curves are added to.";
+    Range, "--range", "Temperatures that a plan covers.";
+    Curves, "--curves line", "Shape of curves over temperature.";
+    SetPoints, "--points", "Set points of a soak.";
+    Soak, "--soak", "Time at a set point.";
     StepTimes, "--step-every", "When the dwells of a recording begin and end.";
     RawUnit, "--raw-unit", "Unit of the readings.";
     Units, "--units", "Units of the readings in a file.";
