@@ -12,7 +12,6 @@ pub mod allan_plot;
 mod apply;
 mod body;
 pub(crate) mod budget;
-mod certificate;
 mod compare;
 pub(crate) mod data_sheet;
 mod design;
@@ -43,7 +42,6 @@ pub use accept::{accept_line, accept_text};
 pub use allan::allan_text;
 pub use apply::apply_text;
 pub(crate) use body::{body_errors_text, body_text, split_text, with_sensors};
-pub use certificate::certificate_page;
 pub use compare::compare_text;
 pub use design::{design_text, next_text};
 pub use device::{
@@ -63,6 +61,6 @@ pub use thermal::{thermal_page, thermal_text};
 pub use thermal_plan::thermal_plan_text;
 #[cfg(not(target_family = "wasm"))]
 pub(crate) use thermal_record::{thermal_progress, thermal_record_text};
-pub use unit::{UnitReport, trace_figure, unit_page};
+pub use unit::{Particulars, UnitReport, trace_figure, unit_page};
 pub use verify::verify_text;
 pub use wizard::{wizard_lines, wizard_text};

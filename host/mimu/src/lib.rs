@@ -59,8 +59,6 @@ pub mod bias_removal;
 #[doc(hidden)]
 pub mod calibration;
 #[doc(hidden)]
-pub mod certificate;
-#[doc(hidden)]
 pub mod data_sheet;
 #[doc(hidden)]
 pub mod diagnose;

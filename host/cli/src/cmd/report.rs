@@ -1,7 +1,5 @@
 //! `mimu report`: arguments and execution.
 
-mod certificate;
-
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -20,9 +18,7 @@ use crate::hint::OF_A_LOG;
 use crate::output::{now, progress, show};
 use crate::reading::{LogArgs, read};
 use crate::report::refused;
-use crate::report::{Made, UnitReport, problems_text, unit_page};
-
-use self::certificate::{CertificateArgs, Given};
+use crate::report::{Made, Particulars, UnitReport, problems_text, unit_page};
 
 #[derive(Args)]
 pub struct ReportArgs {
@@ -48,8 +44,9 @@ pub struct ReportArgs {
     part: PartArgs,
     #[command(flatten)]
     whole: WholeTurnArgs,
-    #[command(flatten)]
-    certificate: CertificateArgs,
+    /// Head the page as a calibration certificate: the file states laboratory, customer, item and dates (docs/report.md)
+    #[arg(long, value_name = "FILE")]
+    certificate: Option<PathBuf>,
     #[command(flatten, next_help_heading = OF_A_LOG)]
     log: LogArgs,
 }
@@ -94,10 +91,12 @@ impl Inputs {
 
 pub fn run(args: &ReportArgs, command_line: &str) -> Result<()> {
     let part = args.part.part()?;
+    let particulars = args.certificate.as_deref().map(Particulars::read);
+    let particulars = particulars.transpose()?;
     let inputs = Inputs::of(args)?;
     let outputs = [Some(args.out.as_path())];
-    let mut others = vec![args.noise.file.as_deref(), inputs.calibration.as_deref()];
-    others.extend(args.certificate.inputs());
+    let others = [&args.noise.file, &inputs.calibration, &args.certificate];
+    let others = others.map(Option::as_deref);
     let noise = args.noise.read()?;
     let open = |path: &PathBuf| -> Result<(String, Prepared)> {
         let prepared = read(path, &args.log, args.still.search(), &outputs, &others)?;
@@ -106,17 +105,6 @@ pub fn run(args: &ReportArgs, command_line: &str) -> Result<()> {
         Ok((path.display().to_string(), prepared))
     };
     let recordings: Vec<_> = inputs.recordings.iter().map(open).collect::<Result<_>>()?;
-    if let Some(particulars) = &args.certificate.particulars {
-        let given = Given {
-            recording: the_only(recordings)?,
-            calibration: args.calibration.as_deref(),
-            noise: noise.as_ref(),
-            part: part.as_ref(),
-            out: &args.out,
-            command_line,
-        };
-        return args.certificate.write(particulars, given);
-    }
     let others: Vec<_> = inputs.verify.iter().map(open).collect::<Result<_>>()?;
     let now = now();
     let found = match recordings.is_empty() {
@@ -159,6 +147,7 @@ pub fn run(args: &ReportArgs, command_line: &str) -> Result<()> {
         not_judged: &not_judged,
         noise: noise.as_ref(),
         data_sheet: sheet.as_ref(),
+        particulars: particulars.as_ref(),
     };
     let made = Made::of(&inputs.recordings, command_line);
     stage(&args.out, unit_page(&unit, &made))?.publish()?;
@@ -207,21 +196,6 @@ fn verdict(unit: &UnitReport) -> String {
             Some(judgement) => format!("{}\njudgement: {judgement}\n", unit.calibration.device),
             None => format!("{}\n", unit.calibration.device),
         },
-    }
-}
-
-/// The recording of a certificate.
-fn the_only(recordings: Vec<(String, Prepared)>) -> Result<(String, Prepared)> {
-    match <[_; 1]>::try_from(recordings) {
-        Ok([recording]) => Ok(recording),
-        Err(all) => Err(Error::new(
-            "recordings",
-            format!(
-                "a certificate is made from one, and {} are given",
-                all.len()
-            ),
-            "name the recording, or the folder of the session, that the certificate is about",
-        )),
     }
 }
 

@@ -82,15 +82,10 @@ const META: &str = r#"<meta charset="utf-8"/><meta name="viewport" content="widt
 
 /// The page with this title.
 pub(super) fn page(title: &str, main: &Markup) -> String {
-    styled_page(title, "", main)
-}
-
-/// The page with this title, and a style beside that of all pages. The style has to be text of XML too.
-pub(super) fn styled_page(title: &str, style: &str, main: &Markup) -> String {
     let page = html! {
         (PreEscaped("<!DOCTYPE html>"))
         html lang="en" xmlns="http://www.w3.org/1999/xhtml" {
-            head { (PreEscaped(META)) title { (title) } style { (PreEscaped(STYLE)) (PreEscaped(style)) } }
+            head { (PreEscaped(META)) title { (title) } style { (PreEscaped(STYLE)) } }
             body { main { (main) } }
         }
     };
