@@ -62,8 +62,6 @@ pub enum Seen {
     EmptySamples,
     /// Values of the thermometer that cannot be temperatures.
     Temperatures,
-    /// Firmware removes the bias of the gyro.
-    BiasRemoved,
     /// Another range of the accelerometer from some row on.
     RangeChange,
     /// Columns that change places at some row.
@@ -104,7 +102,6 @@ impl Seen {
                 fault: Fault::Missing(_),
                 ..
             } => Self::EmptySamples,
-            Warning::BiasRemoved(_) => Self::BiasRemoved,
             _ => return None,
         })
     }
@@ -141,7 +138,6 @@ impl Seen {
             Self::Gaps => "gaps",
             Self::EmptySamples => "empty_samples",
             Self::Temperatures => "temperatures",
-            Self::BiasRemoved => "bias_removed",
             Self::RangeChange => "range_change",
             Self::ColumnsMoved => "columns_moved",
         }

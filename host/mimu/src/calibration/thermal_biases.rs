@@ -165,7 +165,7 @@ impl ThermalBiases {
             device: unit.device,
             unit_id: unit.unit_id,
             created: created.into(),
-            tool: concat!("mimu ", env!("CARGO_PKG_VERSION")).into(),
+            tool: crate::result::TOOL.into(),
             judgement: unit.judgement,
             rms: unit.rms,
             range_c: unit.range_c,
