@@ -13,7 +13,6 @@ pub mod prediction;
 pub mod recipe;
 pub mod words;
 
-
 use rayon::prelude::*;
 use serde::{Serialize, Serializer};
 
