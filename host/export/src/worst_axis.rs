@@ -255,10 +255,7 @@ fn worst(
         )
     };
     let first = channels.first().ok_or_else(no_channel)?;
-    if let Err(other) = first.model_in(sensor.unit()) {
-        let problem = format!("its unit is {}, not {}", other.found, sensor.unit());
-        return Err(other.refused(format!("{place}, channel {}", first.name), problem));
-    }
+    first.model_in(sensor.unit(), place)?;
     let (mut seen, mut missing) = (Vec::new(), Vec::new());
     for channel in channels {
         let name = &channel.name;

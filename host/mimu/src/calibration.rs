@@ -238,9 +238,6 @@ pub struct TriadTable {
     pub C: [[f64; 3]; 3],
     /// SI.
     pub o: [f64; 3],
-    /// How firmware removes the bias before the reading is recorded. `o` and the biases are then those of such readings, and not of the sensor.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub bias_removed: Option<String>,
     /// Standard deviations of C.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sigma_C: Option<[[f64; 3]; 3]>,
@@ -353,7 +350,44 @@ pub struct PhysicalTable {
     pub sigma_non_orthogonality_deg: Option<[f64; 3]>,
 }
 
+impl Origin {
+    /// Of readings in this unit, and nothing else known.
+    fn of(raw_unit: RawUnit) -> Self {
+        Self {
+            sha256: None,
+            reference: None,
+            raw_unit,
+            gravity_mps2: None,
+            clock: None,
+            temp_c: None,
+            temp_range_c: None,
+        }
+    }
+}
+
 impl Calibration {
+    /// A calibration of no triad yet.
+    fn empty(device: &str, recording: Origin) -> Self {
+        Self {
+            format: FORMAT.into(),
+            device: device.to_owned(),
+            unit_id: None,
+            created: None,
+            trimmed: None,
+            between_sessions: None,
+            sessions: Vec::new(),
+            tool: crate::result::TOOL.into(),
+            judgement: None,
+            sensors: None,
+            recording,
+            gyro: None,
+            accel: None,
+            temperature: None,
+            effects: Vec::new(),
+            body: Vec::new(),
+        }
+    }
+
     /// Reads and checks a calibration file.
     pub fn read(path: &Path) -> Result<Self> {
         let text = read_text(path)?;

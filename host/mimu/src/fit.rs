@@ -299,14 +299,10 @@ fn fit_as_prepared(mut prepared: Prepared, options: Options) -> Result<Fit> {
 /// The same, if the user does not.
 fn suspicions(prepared: &Prepared) -> Result<Vec<Warning>> {
     if prepared.manifest.trusts_readings() {
-        let found = prepared.dwells.fault.iter();
-        let found = found.chain(&prepared.condensed.signed_low_byte);
+        let found = prepared.condensed.signed_low_byte.iter();
         return Ok(found.copied().map(Warning::Health).collect());
     }
-    match &prepared.dwells.fault {
-        Some(fault) => Err(fault.refusal(&prepared.place)),
-        None => plausible::check_readings(prepared).map(|()| Vec::new()),
-    }
+    plausible::check_readings(prepared).map(|()| Vec::new())
 }
 
 /// Moves what the accelerometer read before the last power-on to the bias of the last, if the poses determine both. The fit finds what remains of the

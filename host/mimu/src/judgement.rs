@@ -5,9 +5,23 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 
 /// Kinds of judgements, from the best to the worst.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[derive(
+    Debug,
+    Clone,
+    Copy,
+    PartialEq,
+    Eq,
+    PartialOrd,
+    Ord,
+    Hash,
+    Serialize,
+    Deserialize,
+    strum::Display,
+    strum::IntoStaticStr,
+)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
+#[strum(serialize_all = "lowercase")]
 pub enum JudgementKind {
     /// Errors of data that were held out are those of noise.
     Good,
@@ -24,24 +38,13 @@ pub enum JudgementKind {
 impl JudgementKind {
     /// As in files.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Good => "good",
-            Self::Untested => "untested",
-            Self::Suspect => "suspect",
-            Self::Unexplained => "unexplained",
-            Self::Misfit => "misfit",
-        }
-    }
-}
-
-impl fmt::Display for JudgementKind {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
+        self.into()
     }
 }
 
 /// A judgement with its reason. Displayed as `kind: reason`.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, Serialize, Deserialize)]
+#[error("{kind}: {reason}")]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Judgement {
@@ -77,12 +80,6 @@ impl Judgement {
     /// Whether it is `good`.
     pub fn is_good(&self) -> bool {
         self.kind == JudgementKind::Good
-    }
-}
-
-impl fmt::Display for Judgement {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: {}", self.kind, self.reason)
     }
 }
 

@@ -256,13 +256,7 @@ impl Noise {
                     }
                     _ => raw.as_str(),
                 };
-                let model = channel.model_in(unit).map_err(|other| {
-                    let problem = format!(
-                        "its unit is {}, and that of the readings is {unit}",
-                        other.found
-                    );
-                    other.refused(format!("{}, channel {name}", file.place), problem)
-                })?;
+                let model = channel.model_in(unit, &file.place)?;
                 nodes.push((channel.temp_c.unwrap_or(f64::NAN), model));
             }
             if nodes.is_empty() {

@@ -8,7 +8,6 @@ use crate::prepared::Prepared;
 use crate::quantity::{PerSensor, Sensor};
 use crate::signal::blocks::{Block, Condensed, Level, Moments};
 use crate::signal::dwell::{Dwell, Dwells, Fault, Keep, Mean};
-use crate::signal::jump::Jump;
 use crate::warning::Warning;
 use mimu_recording::error::Result;
 use mimu_recording::{Column, PoseMean, PoseMeans, Reference};
@@ -53,7 +52,6 @@ impl Prepared {
             warnings: warnings(&list, means, &has_raw),
             list,
             detection: None,
-            fault: None,
             rails: Default::default(),
             longest_run: [f64::INFINITY; 6],
             left_out: Vec::new(),
@@ -68,7 +66,6 @@ impl Prepared {
                 Sensor::BOTH.map(|s| means.poses.iter().all(|p| knows_noise(p, s))),
             ),
             place: means.place.clone(),
-            bias_removal: None,
             power_ons: Default::default(),
             earth_on_table: None,
             prior: None,
@@ -142,7 +139,6 @@ fn block(dwell: &Dwell, pose: &PoseMean) -> Block {
             max: mean.mean,
             ..Moments::default()
         }),
-        jump: Jump::default(),
         reference: pose.reference.map(level),
         temp_c: level(pose.temp_c),
     }

@@ -44,10 +44,8 @@ pub struct Prior {
     /// Whether the biases are used.
     pub biases: bool,
     /// Gyro.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gyro: Option<PriorTable>,
     /// Accelerometer.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub accel: Option<PriorTable>,
 }
 

@@ -3,8 +3,6 @@
 //! Most problems appear while the recording is read or its dwells are judged, as a [`Warning`] with figures. This module looks for what
 //! only a fit shows: an implausible offset of an accelerometer, or a missing pose.
 
-use std::fmt;
-
 use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
 
@@ -23,24 +21,33 @@ const LARGEST_OFFSET_G: f64 = 0.5;
 const SLOW_HZ: f64 = 40.0;
 
 /// What is wrong with a recording.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum RecordingProblem {
     /// An axis of the accelerometer, and its offset, g.
+    #[error("accel_{} has an offset of {} g, more than any working part: check that the part is undamaged, that its range is set as assumed, and that its zero was subtracted", AXES[*.0], significant(*.1))]
     Offset(usize, f64),
     /// Sample rate of a recording in which the unit is turned by hand, Hz.
+    #[error("{} Hz is a low rate for turns by hand: record at 50 Hz or more, or turn slowly", significant(*.0))]
     SlowForTurns(f64),
     /// Temperatures at which no board is used.
+    #[error("{0}")]
     Temperatures(Finding),
     /// Faces that no pose had up.
+    #[error("no pose has {0} up, so the errors there are unknown: add such poses")]
     MissingPoses(String),
     /// Samples that were lost between the device and the PC.
+    #[error(
+        "{0} samples were lost between the device and the PC: check the cable and the load of the PC"
+    )]
     LostSamples(u64),
     /// Warnings of one kind from reading the recording and judging its dwells; at least one.
+    #[error("{}", seen(.1))]
     Seen(Seen, Vec<Warning>),
 }
 
 /// Kinds of problems that appear without a fit.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, strum::IntoStaticStr)]
+#[strum(serialize_all = "snake_case")]
 pub enum Seen {
     /// Readings are not in their declared unit.
     Unit,
@@ -62,12 +69,6 @@ pub enum Seen {
     EmptySamples,
     /// Values of the thermometer that cannot be temperatures.
     Temperatures,
-    /// Firmware removes the bias of the gyro.
-    BiasRemoved,
-    /// Another range of the accelerometer from some row on.
-    RangeChange,
-    /// Columns that change places at some row.
-    ColumnsMoved,
 }
 
 impl Seen {
@@ -104,7 +105,6 @@ impl Seen {
                 fault: Fault::Missing(_),
                 ..
             } => Self::EmptySamples,
-            Warning::BiasRemoved(_) => Self::BiasRemoved,
             _ => return None,
         })
     }
@@ -122,29 +122,13 @@ impl Seen {
             | health::Fault::NotCounts { .. }
             | health::Fault::Turning { .. } => Self::Unit,
             health::Fault::NoTemperatures { .. } => Self::Temperatures,
-            health::Fault::RangeChanged { .. } => Self::RangeChange,
-            health::Fault::ColumnsMoved { .. } => Self::ColumnsMoved,
             health::Fault::Held { .. } => Self::HeldReadings,
             _ => return None,
         })
     }
 
     fn id(self) -> &'static str {
-        match self {
-            Self::Unit => "unit",
-            Self::DeadChannel => "dead_channel",
-            Self::Rails => "rails",
-            Self::Clipping => "clipping",
-            Self::HeldReadings => "held_readings",
-            Self::Clock => "clock",
-            Self::SampleRate => "sample_rate",
-            Self::Gaps => "gaps",
-            Self::EmptySamples => "empty_samples",
-            Self::Temperatures => "temperatures",
-            Self::BiasRemoved => "bias_removed",
-            Self::RangeChange => "range_change",
-            Self::ColumnsMoved => "columns_moved",
-        }
+        self.into()
     }
 }
 
@@ -283,40 +267,12 @@ fn offsets(fit: &Fit, accel: &SensorFit) -> Vec<RecordingProblem> {
         .collect()
 }
 
-impl fmt::Display for RecordingProblem {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        match self {
-            Self::Offset(axis, g) => write!(
-                f,
-                "accel_{} has an offset of {} g, more than any working part: check that the part is undamaged, that its range is set as assumed, and that its zero was subtracted",
-                AXES[*axis],
-                significant(*g)
-            ),
-            Self::SlowForTurns(hz) => write!(
-                f,
-                "{} Hz is a low rate for turns by hand: record at 50 Hz or more, or turn slowly",
-                significant(*hz)
-            ),
-            Self::Temperatures(found) => write!(f, "{found}"),
-            Self::MissingPoses(faces) => write!(
-                f,
-                "no pose has {faces} up, so the errors there are unknown: add such poses"
-            ),
-            Self::LostSamples(count) => write!(
-                f,
-                "{count} samples were lost between the device and the PC: check the cable and the load of the PC"
-            ),
-            Self::Seen(_, warnings) => {
-                let Some(first) = warnings.first() else {
-                    return Ok(());
-                };
-                write!(f, "{first}")?;
-                match warnings.len() - 1 {
-                    0 => Ok(()),
-                    more => write!(f, " (and {more} more of this kind)"),
-                }
-            }
-        }
+/// The first of the warnings of one kind, and the number of the others.
+fn seen(warnings: &[Warning]) -> String {
+    match warnings {
+        [] => String::new(),
+        [only] => only.to_string(),
+        [first, more @ ..] => format!("{first} (and {} more of this kind)", more.len()),
     }
 }
 

@@ -1,6 +1,5 @@
 //! From samples to the dwells and turns that a calibration is made of.
 
-pub mod bias_removal;
 pub mod blocks;
 pub(crate) mod change_point;
 pub(crate) mod contrast;
@@ -8,8 +7,6 @@ pub(crate) mod course;
 pub mod dwell;
 pub(crate) mod dwells_of_files;
 pub mod increment;
-pub mod jump;
-pub(crate) mod log_fault;
 pub mod moments;
 pub mod power_ons;
 pub mod quantisation_step;

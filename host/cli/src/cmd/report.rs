@@ -18,7 +18,7 @@ use crate::hint::OF_A_LOG;
 use crate::output::{now, progress, show};
 use crate::reading::{LogArgs, read};
 use crate::report::refused;
-use crate::report::{Made, UnitReport, problems_text, unit_page};
+use crate::report::{Made, Particulars, UnitReport, problems_text, unit_page};
 
 #[derive(Args)]
 pub struct ReportArgs {
@@ -44,6 +44,9 @@ pub struct ReportArgs {
     part: PartArgs,
     #[command(flatten)]
     whole: WholeTurnArgs,
+    /// Head the page as a calibration certificate: the file states laboratory, customer, item and dates (docs/report.md)
+    #[arg(long, value_name = "FILE")]
+    certificate: Option<PathBuf>,
     #[command(flatten, next_help_heading = OF_A_LOG)]
     log: LogArgs,
 }
@@ -88,9 +91,12 @@ impl Inputs {
 
 pub fn run(args: &ReportArgs, command_line: &str) -> Result<()> {
     let part = args.part.part()?;
+    let particulars = args.certificate.as_deref().map(Particulars::read);
+    let particulars = particulars.transpose()?;
     let inputs = Inputs::of(args)?;
     let outputs = [Some(args.out.as_path())];
-    let others = [args.noise.file.as_deref(), inputs.calibration.as_deref()];
+    let others = [&args.noise.file, &inputs.calibration, &args.certificate];
+    let others = others.map(Option::as_deref);
     let noise = args.noise.read()?;
     let open = |path: &PathBuf| -> Result<(String, Prepared)> {
         let prepared = read(path, &args.log, args.still.search(), &outputs, &others)?;
@@ -141,6 +147,7 @@ pub fn run(args: &ReportArgs, command_line: &str) -> Result<()> {
         not_judged: &not_judged,
         noise: noise.as_ref(),
         data_sheet: sheet.as_ref(),
+        particulars: particulars.as_ref(),
     };
     let made = Made::of(&inputs.recordings, command_line);
     stage(&args.out, unit_page(&unit, &made))?.publish()?;

@@ -3,11 +3,12 @@
 mod prior;
 
 use maud::{Markup, html};
+use mimu::plan::design::budget::Spending;
 use mimu::plan::design::judgement::WEAK;
 use mimu::plan::round;
 use mimu::quantity::{Figure, minutes, plural, significant};
 use mimu::readable;
-use mimu::result::design::{Design, Spent, Way};
+use mimu::result::design::{Design, Spent};
 use mimu::result::next_experiment::NextExperiment;
 use mimu_equipment::step::words;
 
@@ -94,8 +95,8 @@ fn limit(budget: &Spent) -> Markup {
 fn ways(budget: &Spent) -> Markup {
     let best = &budget.best;
     let shown = [4, 5, 6, 8, 9, 10, 12, 14, 16, 20, 25, 30, 35, 40];
-    let is_best = |w: &Way| w.dwells_a_pass == best.dwells_a_pass;
-    let listed = |way: &&Way| is_best(way) || shown.contains(&way.dwells_a_pass);
+    let is_best = |w: &Spending| w.dwells_a_pass == best.dwells_a_pass;
+    let listed = |way: &&Spending| is_best(way) || shown.contains(&way.dwells_a_pass);
     html! { (table("Ways to spend the time", &html! { th { "dwells a pass" } th.n { "passes" } th.n { "dwell, s" } th.n { "moves" } th.n { "sigma over best" } th {} }, &html! {
         @for way in budget.ways.iter().filter(listed) { tr {
             td { (way.dwells_a_pass) } td.n { (way.passes) } (number(way.dwell_s, 1.0)) td.n { (format!("{:.0} %", 100.0 * way.moves_s / budget.time_s)) }

@@ -2,6 +2,7 @@
 
 pub(super) mod body;
 pub(super) mod curves;
+mod heading;
 pub(super) mod model;
 pub(super) mod noise;
 pub(super) mod poses;
@@ -14,6 +15,8 @@ use mimu::data_sheet::DataSheet;
 use mimu::noise::noise_file::NoiseFile;
 use mimu::prepared::Prepared;
 use mimu::result::diagnosis::DiagnosisResult;
+
+pub use heading::Particulars;
 
 use super::page::{Level, Made, contents, judged, page};
 use super::{data_sheet, diagnosis, verify};
@@ -38,12 +41,15 @@ pub struct UnitReport<'a> {
     pub noise: Option<&'a NoiseFile>,
     /// The unit against the data sheet of its part.
     pub data_sheet: Option<&'a DataSheet>,
+    /// The heading that makes the page a certificate.
+    pub particulars: Option<&'a Particulars>,
 }
 
 /// The page of a unit.
 pub fn unit_page(unit: &UnitReport, made: &Made) -> String {
     let (calibration, found) = (unit.calibration, unit.diagnosis);
     let main = html! {
+        @if let Some(particulars) = unit.particulars { (particulars.head(&made.created)) }
         h1 { "Inertial unit " (calibration.device) }
         @match (found, &calibration.judgement) {
             (Some(found), _) => (diagnosis::first(found, Level::Page)),
@@ -88,6 +94,7 @@ pub fn unit_page(unit: &UnitReport, made: &Made) -> String {
             (diagnosis::tried(found, Level::Page, true))
             (diagnosis::method())
         }
+        @if let Some(particulars) = unit.particulars { (particulars.signatures()) }
         (made.line(concat!("mimu ", env!("CARGO_PKG_VERSION"))))
     };
     let verdict = found.map_or("calibration", |d| d.verdict.name());

@@ -191,13 +191,6 @@ impl ComparedParameter {
 }
 
 impl ComparedParameter {
-    /// The sensor, if it is the first gyro or the first accelerometer.
-    pub fn of_first(&self) -> Option<Sensor> {
-        Sensor::BOTH
-            .into_iter()
-            .find(|s| name_of(*s) == self.sensor)
-    }
-
     /// Of two files, the second value minus the first, and the half-width of its 95 % interval if it is known. `None` for more files.
     pub fn difference(&self) -> Option<(f64, Option<f64>)> {
         let &[first, second] = self.values.as_slice() else {

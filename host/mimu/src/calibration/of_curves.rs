@@ -82,31 +82,24 @@ impl Calibration {
                 judged,
             ))
         };
+        let recording = Origin {
+            sha256: Some(unit.sha256.clone()).filter(|s| !s.is_empty()),
+            reference: Some(unit.reference),
+            gravity_mps2: Some(unit.gravity_mps2),
+            temp_c: Some(unit.temp_c),
+            temp_range_c: Some(unit.temperature.range_c),
+            ..Origin::of(unit.raw_unit)
+        };
         let calibration = Self {
             format: Self::format_of(true).into(),
-            device: unit.device.clone(),
             unit_id: unit.unit_id.clone(),
             created: Some(created.into()),
-            trimmed: None,
-            between_sessions: None,
-            sessions: Vec::new(),
-            tool: concat!("mimu ", env!("CARGO_PKG_VERSION")).into(),
             judgement: Some(unit.judgement),
             sensors: unit.sensors.clone(),
-            recording: Origin {
-                sha256: Some(unit.sha256.clone()).filter(|s| !s.is_empty()),
-                reference: Some(unit.reference),
-                raw_unit: unit.raw_unit,
-                gravity_mps2: Some(unit.gravity_mps2),
-                clock: None,
-                temp_c: Some(unit.temp_c),
-                temp_range_c: Some(unit.temperature.range_c),
-            },
             gyro: table(Sensor::Gyro),
             accel: table(Sensor::Accel),
-            effects: Vec::new(),
-            body: Vec::new(),
             temperature: Some(unit.temperature),
+            ..Self::empty(&unit.device, recording)
         };
         calibration.checked(&format!("calibration of {:?}", unit.device))
     }
@@ -139,7 +132,7 @@ impl Calibration {
         }
         all.format = Self::format_of(true).into();
         all.created = Some(created.into());
-        all.tool = concat!("mimu ", env!("CARGO_PKG_VERSION")).into();
+        all.tool = crate::result::TOOL.into();
         all.recording.temp_c = Some(temp_c);
         all.recording.temp_range_c = Some(temperature.range_c);
         all.temperature = Some(temperature);

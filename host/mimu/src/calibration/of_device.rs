@@ -3,16 +3,15 @@
 use mimu_core::compensation::Affine;
 use mimu_core::effects::DeviceEffect;
 use mimu_core::table::Node;
-use nalgebra::{Matrix3, Vector3};
 
-use super::of_fit::{forward_table, physical_table};
+use super::of_fit::{by_rows, exact_table};
 use super::{
-    Calibration, DieTable, FORMULA, INVERSE_DIRECTION, NodeTable, Origin, OverTemperature,
-    TemperatureNode, TriadTable, reference_node,
+    Calibration, DieTable, NodeTable, Origin, OverTemperature, TemperatureNode, TriadTable,
+    reference_node,
 };
 use crate::effects::fitted::FittedEffect;
 use crate::quantity::{PerSensor, Sensor};
-use crate::triad::{Angles, Triad};
+use crate::triad::Triad;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{Manifest, RawUnit, SensorSettings};
 
@@ -64,31 +63,23 @@ impl Calibration {
             |model, sensor| triad_table(model, sensor, stored.raw_unit).ok_or_else(singular);
         let temperature = over_temperature(stored);
         let range_c = stored.range_c.map(|range| range.map(f64::from));
+        let recording = Origin {
+            sha256: stored.sha256.clone(),
+            temp_c: Some(f64::from(node.temp_c)),
+            temp_range_c: range_c.filter(|_| temperature.is_none()),
+            ..Origin::of(stored.raw_unit)
+        };
         let calibration = Self {
             format: Self::format_of(temperature.is_some()).into(),
-            device: stored.device.clone(),
             unit_id: stored.unit_id.clone(),
             created: stored.created.clone(),
             trimmed: stored.trimmed.clone(),
-            between_sessions: None,
-            sessions: Vec::new(),
-            tool: concat!("mimu ", env!("CARGO_PKG_VERSION")).into(),
-            judgement: None,
             sensors: stored.sensors.clone(),
-            recording: Origin {
-                sha256: stored.sha256.clone(),
-                reference: None,
-                raw_unit: stored.raw_unit,
-                gravity_mps2: None,
-                clock: None,
-                temp_c: Some(f64::from(node.temp_c)),
-                temp_range_c: range_c.filter(|_| temperature.is_none()),
-            },
             gyro: Some(triad(&node.model.gyro, Sensor::Gyro)?),
             accel: Some(triad(&node.model.accel, Sensor::Accel)?),
             temperature,
             effects: FittedEffect::all_of_device(&stored.effects).map_err(unknown)?,
-            body: Vec::new(),
+            ..Self::empty(&stored.device, recording)
         };
         calibration.checked(place)
     }
@@ -107,29 +98,16 @@ impl Calibration {
             let remedy = "give the unit's calibration; readings in rad/s and m/s² need none";
             return Err(Error::new(place, problem, remedy));
         }
-        let as_it_is = || Affine {
-            matrix: Matrix3::identity(),
-            offset: Vector3::zeros(),
+        let table = |sensor| {
+            let triad = Triad::from_inverse(Affine::identity(), Vec::new())?;
+            Some(exact_table(&triad, sensor, RawUnit::Si, "body"))
         };
-        let model = PerSensor::from_fn(|_| as_it_is());
-        let mut own = Self::of_device(
-            &DeviceCalibration {
-                device: manifest.device.clone(),
-                unit_id: manifest.unit_id().map(str::to_owned),
-                sensors: None,
-                raw_unit: RawUnit::Si,
-                created: None,
-                trimmed: None,
-                sha256: None,
-                nodes: vec![Node::constant(0.0, model)],
-                range_c: None,
-                lags_s: None,
-                effects: Vec::new(),
-            },
-            &place,
-        )?;
-        own.recording.temp_c = None;
-        Ok(own)
+        Ok(Self {
+            unit_id: manifest.unit_id().map(str::to_owned),
+            gyro: table(Sensor::Gyro),
+            accel: table(Sensor::Accel),
+            ..Self::empty(&manifest.device, Origin::of(RawUnit::Si))
+        })
     }
 }
 
@@ -143,10 +121,10 @@ fn over_temperature(stored: &DeviceCalibration) -> Option<OverTemperature> {
     }
     let ends = [stored.nodes.first()?.temp_c, stored.nodes.last()?.temp_c];
     let table = |model: &Affine<f32>, slope: &Affine<f32>| NodeTable {
-        C: rows(&model.matrix.map(f64::from)),
-        o: exact(&model.offset.map(f64::from)),
-        slope_C: rows(&slope.matrix.map(f64::from)),
-        slope_o: exact(&slope.offset.map(f64::from)),
+        C: by_rows(&model.matrix.map(f64::from)),
+        o: model.offset.map(f64::from).into(),
+        slope_C: by_rows(&slope.matrix.map(f64::from)),
+        slope_o: slope.offset.map(f64::from).into(),
         sigma_C: None,
         sigma_o: None,
         sigma_scale_factor: None,
@@ -176,36 +154,7 @@ fn triad_table(model: &Affine<f32>, sensor: Sensor, raw_unit: RawUnit) -> Option
     };
     // Without a covariance its sigmas mean nothing, so they are left out.
     let triad = Triad::from_inverse(inverse, Vec::new())?;
-    let Affine { matrix, offset }: Affine<f64> = inverse;
-    Some(TriadTable {
-        formula: FORMULA.into(),
-        direction: INVERSE_DIRECTION.into(),
-        raw_unit,
-        unit: sensor.unit().into(),
-        frame: "body".into(),
-        C: rows(&matrix),
-        o: exact(&offset),
-        bias_removed: None,
-        sigma_C: None,
-        sigma_o: None,
-        interval_C: None,
-        interval_o: None,
-        parameters: Vec::new(),
-        covariance: Vec::new(),
-        covariance_by_noise: Vec::new(),
-        judged: None,
-        next_power_on: None,
-        forward: forward_table(&triad.forward),
-        physical: physical_table(&triad.physical(Angles::Exact)),
-    })
+    Some(exact_table(&triad, sensor, raw_unit, "body"))
 }
 
 // These keep the sign of a zero, so the device makes the same bytes of them.
-
-fn rows(matrix: &Matrix3<f64>) -> [[f64; 3]; 3] {
-    std::array::from_fn(|i| std::array::from_fn(|j| matrix[(i, j)]))
-}
-
-fn exact(vector: &Vector3<f64>) -> [f64; 3] {
-    (*vector).into()
-}

@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::body::BodyTriad;
 use super::{
-    Calibration, FORMAT, FORMULA, ForwardTable, INVERSE_DIRECTION, Judged, Origin, PhysicalTable,
+    Calibration, FORMULA, ForwardTable, INVERSE_DIRECTION, Judged, Origin, PhysicalTable,
     TriadTable,
 };
 use crate::effects::fitted::FittedEffect;
@@ -74,31 +74,18 @@ impl Calibration {
     }
 
     fn without_triads(manifest: &Manifest, judgement: Judgement, created: &str) -> Self {
+        let recording = Origin {
+            reference: Some(manifest.reference),
+            gravity_mps2: Some(manifest.gravity_mps2),
+            clock: manifest.clock,
+            ..Origin::of(manifest.raw_unit)
+        };
         Self {
-            format: FORMAT.into(),
-            device: manifest.device.clone(),
             unit_id: manifest.unit_id().map(str::to_owned),
             created: Some(created.into()),
-            trimmed: None,
-            between_sessions: None,
-            sessions: Vec::new(),
-            tool: concat!("mimu ", env!("CARGO_PKG_VERSION")).into(),
             judgement: Some(judgement),
             sensors: manifest.sensors().cloned(),
-            recording: Origin {
-                sha256: None,
-                reference: Some(manifest.reference),
-                raw_unit: manifest.raw_unit,
-                gravity_mps2: Some(manifest.gravity_mps2),
-                clock: manifest.clock,
-                temp_c: None,
-                temp_range_c: None,
-            },
-            gyro: None,
-            accel: None,
-            temperature: None,
-            effects: Vec::new(),
-            body: Vec::new(),
+            ..Self::empty(&manifest.device, recording)
         }
     }
 }
@@ -136,18 +123,13 @@ fn table(fit: &Fit, found: &SensorFit) -> TriadTable {
         condition: rounded(found.estimated.condition, SIGMA_DIGITS + 1),
     };
     let raw_unit = fit.prepared.manifest.raw_unit;
-    let removal = fit.prepared.bias_removal;
-    let removal = removal.filter(|_| found.sensor == Sensor::Gyro);
-    TriadTable {
-        bias_removed: removal.map(|r| r.to_string()),
-        ..triad_table(
-            &found.estimated.triad,
-            found.sensor,
-            raw_unit,
-            frame,
-            judged,
-        )
-    }
+    triad_table(
+        &found.estimated.triad,
+        found.sensor,
+        raw_unit,
+        frame,
+        judged,
+    )
 }
 
 /// The table of a triad whose axes are those of `frame`.
@@ -164,6 +146,38 @@ pub fn triad_table(
     let sigmas = |i: usize| rounded(estimates[i].sigma, SIGMA_DIGITS);
     let intervals = |i: usize| rounded(estimates[i].interval, SIGMA_DIGITS);
     let degrees = 1f64.to_degrees();
+    let exact = exact_table(triad, sensor, raw_unit, frame);
+    TriadTable {
+        sigma_C: Some([0, 3, 6].map(|i| [i, i + 1, i + 2].map(sigmas))),
+        sigma_o: Some([9, 10, 11].map(sigmas)),
+        interval_C: Some([0, 3, 6].map(|i| [i, i + 1, i + 2].map(intervals))),
+        interval_o: Some([9, 10, 11].map(intervals)),
+        parameters: inverse_names().into(),
+        covariance: nested(covariance),
+        // Noise alone: the key would repeat the covariance.
+        covariance_by_noise: match triad.is_by_noise() {
+            true => Vec::new(),
+            false => nested(&triad.known_covariance()),
+        },
+        judged: Some(judged),
+        physical: PhysicalTable {
+            sigma_scale_factor: Some(sigmas_of(&physical.scale, 1.0)),
+            sigma_bias: Some(sigmas_of(&physical.bias, 1.0)),
+            sigma_misalignment_deg: Some(sigmas_of(&physical.misalignment, degrees)),
+            sigma_non_orthogonality_deg: Some(sigmas_of(&physical.non_orthogonality, degrees)),
+            ..exact.physical
+        },
+        ..exact
+    }
+}
+
+/// The table of a triad whose uncertainty is unknown.
+pub(super) fn exact_table(
+    triad: &Triad,
+    sensor: Sensor,
+    raw_unit: RawUnit,
+    frame: &str,
+) -> TriadTable {
     TriadTable {
         formula: FORMULA.into(),
         direction: INVERSE_DIRECTION.into(),
@@ -172,27 +186,17 @@ pub fn triad_table(
         frame: frame.into(),
         C: by_rows(&triad.inverse.matrix),
         o: plain(&triad.inverse.offset),
-        bias_removed: None,
-        sigma_C: Some([0, 3, 6].map(|i| [i, i + 1, i + 2].map(sigmas))),
-        sigma_o: Some([9, 10, 11].map(sigmas)),
-        interval_C: Some([0, 3, 6].map(|i| [i, i + 1, i + 2].map(intervals))),
-        interval_o: Some([9, 10, 11].map(intervals)),
-        parameters: inverse_names().into(),
-        covariance: nested(covariance),
-        covariance_by_noise: match triad.is_by_noise() {
-            true => Vec::new(),
-            false => nested(&triad.known_covariance()),
-        },
-        judged: Some(judged),
+        sigma_C: None,
+        sigma_o: None,
+        interval_C: None,
+        interval_o: None,
+        parameters: Vec::new(),
+        covariance: Vec::new(),
+        covariance_by_noise: Vec::new(),
+        judged: None,
         next_power_on: None,
         forward: forward_table(&triad.forward),
-        physical: PhysicalTable {
-            sigma_scale_factor: Some(sigmas_of(&physical.scale, 1.0)),
-            sigma_bias: Some(sigmas_of(&physical.bias, 1.0)),
-            sigma_misalignment_deg: Some(sigmas_of(&physical.misalignment, degrees)),
-            sigma_non_orthogonality_deg: Some(sigmas_of(&physical.non_orthogonality, degrees)),
-            ..physical_table(&physical)
-        },
+        physical: physical_table(&triad.physical(Angles::Exact)),
     }
 }
 

@@ -38,7 +38,6 @@ pub struct ThermalBiases {
     /// Unit that it is for.
     pub device: String,
     /// The unit's own number, if it is known.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unit_id: Option<String>,
     /// When it was made, RFC 3339.
     pub created: String,
@@ -68,10 +67,8 @@ pub struct BiasNode {
     /// °C.
     pub temp_c: f64,
     /// Of the gyro.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gyro: Option<RestReading>,
     /// Of the accelerometer.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub accel: Option<RestReading>,
 }
 
@@ -165,7 +162,7 @@ impl ThermalBiases {
             device: unit.device,
             unit_id: unit.unit_id,
             created: created.into(),
-            tool: concat!("mimu ", env!("CARGO_PKG_VERSION")).into(),
+            tool: crate::result::TOOL.into(),
             judgement: unit.judgement,
             rms: unit.rms,
             range_c: unit.range_c,

@@ -14,8 +14,9 @@ use crate::noise::noise_file::NoiseFile;
 use crate::quantity::{AXES, Sensor};
 
 /// Whether a unit keeps a limit.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, strum::IntoStaticStr)]
 #[serde(rename_all = "lowercase")]
+#[strum(serialize_all = "lowercase")]
 pub enum Kept {
     /// The whole interval is within the limit.
     Passed,
@@ -40,11 +41,7 @@ impl Kept {
 
     /// In words.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Passed => "passed",
-            Self::Failed => "failed",
-            Self::Undecided => "undecided",
-        }
+        self.into()
     }
 }
 

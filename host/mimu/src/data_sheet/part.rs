@@ -74,10 +74,8 @@ pub struct Limit {
     /// [`Property::unit`].
     pub unit: String,
     /// Axes that it is for: some of `xyz`; absent for all.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub axes: Option<String>,
     /// Range that it is for, deg/s or g; absent for all.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub full_scale: Option<f64>,
     /// Whether the data sheet calls it typical, and so does not guarantee it.
     #[serde(default)]
@@ -121,10 +119,8 @@ pub struct Part {
     /// Maker, document and revision.
     pub source: String,
     /// Gyro.
-    #[serde(default)]
     pub gyro: Option<PartSensor>,
     /// Accelerometer.
-    #[serde(default)]
     pub accel: Option<PartSensor>,
 }
 

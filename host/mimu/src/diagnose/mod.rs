@@ -50,8 +50,9 @@ use mimu_recording::error::{Error, Result};
 use mimu_recording::{RawUnit, Reference, two_units};
 
 /// Result of a diagnosis in one word.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, strum::IntoStaticStr)]
 #[serde(rename_all = "lowercase")]
+#[strum(serialize_all = "lowercase")]
 pub enum Verdict {
     /// Noise explains the residuals of the affine model.
     Clean,
@@ -66,54 +67,36 @@ pub enum Verdict {
 impl Verdict {
     /// Name.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Clean => "clean",
-            Self::Explained => "explained",
-            Self::Unexplained => "unexplained",
-            Self::Untestable => "untestable",
-        }
+        self.into()
     }
 }
 
 /// Why a recording cannot show whether a sensor errs.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum Untestable {
     /// Too few residuals: their number, and the number of affine parameters.
+    #[error(
+        "{0} residuals for {1} affine parameters do not suffice for a judgement; record more poses"
+    )]
     Residuals(usize, usize),
     /// Whichever part is held out, the rest of the recording does not determine the calibration.
+    #[error(
+        "whichever part of the recording is held out, the rest does not determine the calibration; record each pose twice"
+    )]
     NothingHeldOut,
     /// The poses hardly determine some combinations of parameters: the condition of the fit.
+    #[error(
+        "the poses hardly determine some parameters (condition {0:.0}); record poses that differ more"
+    )]
     Condition(f64),
     /// The directions of gravity that judge the turns are too uncertain: their error over the noise of the turns.
+    #[error("its turns are judged by the accelerometer's directions of gravity, whose uncertainty is {} times the noise of the turns; record more poses", significant(*.0))]
     Reference(f64),
     /// The turns determine the accelerometer too, so its directions agree with them.
+    #[error(
+        "the poses alone hardly determine the accelerometer, so the turns determine it too, and nothing else judges them; record more poses"
+    )]
     WithTurns,
-}
-
-impl std::fmt::Display for Untestable {
-    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
-        match self {
-            Self::Residuals(rows, parameters) => write!(
-                f,
-                "{rows} residuals for {parameters} affine parameters do not suffice for a judgement; record more poses"
-            ),
-            Self::NothingHeldOut => f.write_str(
-                "whichever part of the recording is held out, the rest does not determine the calibration; record each pose twice",
-            ),
-            Self::Condition(condition) => write!(
-                f,
-                "the poses hardly determine some parameters (condition {condition:.0}); record poses that differ more"
-            ),
-            Self::WithTurns => f.write_str(
-                "the poses alone hardly determine the accelerometer, so the turns determine it too, and nothing else judges them; record more poses",
-            ),
-            Self::Reference(times) => write!(
-                f,
-                "its turns are judged by the accelerometer's directions of gravity, whose uncertainty is {} times the noise of the turns; record more poses",
-                significant(*times)
-            ),
-        }
-    }
 }
 
 /// Whether the turns helped to determine the accelerometer of `fit`.

@@ -34,37 +34,51 @@ impl Serialize for Rejected {
 
 /// Why an effect is not accepted. JSON has the name, as `turns_err_more`, and the sentence. The first figure of a pair is without the effect, the second
 /// with it.
-#[derive(Debug, Clone, PartialEq, strum::IntoStaticStr)]
+#[derive(Debug, Clone, PartialEq, strum::IntoStaticStr, thiserror::Error)]
 #[strum(serialize_all = "snake_case")]
 pub enum Reason {
     /// One dwell contains this share of its information.
+    #[error("one dwell contains {:.0} % of its information", 100.0 * .0)]
     OneDwell(f64),
     /// The held-out error does not go down.
+    #[error("the held-out error does not go down: {} without, {} with", .0[0], .0[1])]
     HeldOut([ErrorRms; 2]),
     /// The error of the second recording does not go down: chi-squares, and rms.
+    #[error("the error on the second recording does not go down: chi-square {:.0} without, {:.0} with; rms {} and {}", .0[0], .0[1], .1[0], .1[1])]
     SecondRecording([f64; 2], [ErrorRms; 2]),
     /// Number of held-out parts whose error goes down, and number of those whose error goes up.
+    #[error("the held-out error goes down in {0} of the parts, and up in {1}")]
     Parts(usize, usize),
     /// The data without one block do not determine it.
+    #[error("the data without one block do not determine it")]
     UndeterminedWithoutBlock,
     /// It fits the noise: the residual in units of the noise.
+    #[error("it fits the noise: without it the residual is {} times the noise, with it {} times", significant(.0[0]), significant(.0[1]))]
     FitsNoise([f64; 2]),
     /// One dwell and those in its pose contain the evidence: the probability by chance without them.
+    #[error("its evidence depends on one dwell and those in the same pose: without them, {}", p_value(*.0))]
     LostWithDwell(f64),
     /// It lowers the held-out error, but has no known physics, and no second recording confirms it: the probability by
     /// chance.
+    #[error("{}, and it lowers the held-out error, but no known physics explains it: a suggestion. Confirm it by a second recording that shows it", p_value(*.0))]
     Suggestion(f64),
     /// A bias that walks at random explains the rows as well: the probability by chance beside such a walk.
+    #[error("a bias that wanders at random explains the residuals as well: beside such a bias, {}", if *.0 > CHANCE { "it is no better than chance".into() } else { p_value(*.0) })]
     RandomWalk(f64),
     /// It was not chosen in the search.
+    #[error("{0}")]
     NotChosen(NotChosen),
     /// The calibration file with it errs more on this recording, whose biases are free.
+    #[error("the calibration file with it has a larger error on {}: {} without effects, {} with them", .0, .1[0], .1[1])]
     FileErrsMore(String, [ErrorRms; 2]),
     /// With it the directions of gravity after held-out turns err more.
+    #[error("the directions of gravity after held-out turns err more with it: {} without, {} with", .0[0], .0[1])]
     TurnsErrMore([ErrorRms; 2]),
     /// Without it another effect predicts better.
+    #[error("another effect predicts better, together with the calibration that then results")]
     OtherPredictsBetter,
     /// Readings without it cannot be calibrated.
+    #[error("after its removal the readings cannot be calibrated: {}", .0.refused().problem)]
     NotCalibrated(Error),
 }
 
@@ -101,75 +115,6 @@ pub struct ErrorRms {
 
 /// Probability by chance above which an effect is rejected.
 const CHANCE: f64 = 0.5;
-
-impl fmt::Display for Reason {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::OneDwell(share) => write!(
-                f,
-                "one dwell contains {:.0} % of its information",
-                100.0 * share
-            ),
-            Self::HeldOut([without, with]) => write!(
-                f,
-                "the held-out error does not go down: {without} without, {with} with"
-            ),
-            Self::SecondRecording([a, b], [without, with]) => write!(
-                f,
-                "the error on the second recording does not go down: chi-square {a:.0} without, {b:.0} with; rms {without} and {with}"
-            ),
-            Self::Parts(helped, hurt) => write!(
-                f,
-                "the held-out error goes down in {helped} of the parts, and up in {hurt}"
-            ),
-            Self::UndeterminedWithoutBlock => {
-                f.write_str("the data without one block do not determine it")
-            }
-            Self::FitsNoise(times) => {
-                let [without, with] = times.map(significant);
-                write!(
-                    f,
-                    "it fits the noise: without it the residual is {without} times the noise, with it {with} times"
-                )
-            }
-            Self::LostWithDwell(p) => write!(
-                f,
-                "its evidence depends on one dwell and those in the same pose: without them, {}",
-                p_value(*p)
-            ),
-            Self::RandomWalk(p) => write!(
-                f,
-                "a bias that wanders at random explains the residuals as well: beside such a bias, {}",
-                match *p > CHANCE {
-                    true => "it is no better than chance".into(),
-                    false => p_value(*p),
-                }
-            ),
-            Self::Suggestion(p) => write!(
-                f,
-                "{}, and it lowers the held-out error, but no known physics explains it: a suggestion. Confirm it by a second recording that shows it",
-                p_value(*p)
-            ),
-            Self::NotChosen(one) => write!(f, "{one}"),
-            Self::FileErrsMore(recording, [without, with]) => write!(
-                f,
-                "the calibration file with it has a larger error on {recording}: {without} without effects, {with} with them"
-            ),
-            Self::TurnsErrMore([without, with]) => write!(
-                f,
-                "the directions of gravity after held-out turns err more with it: {without} without, {with} with"
-            ),
-            Self::OtherPredictsBetter => f.write_str(
-                "another effect predicts better, together with the calibration that then results",
-            ),
-            Self::NotCalibrated(error) => write!(
-                f,
-                "after its removal the readings cannot be calibrated: {}",
-                error.refused().problem
-            ),
-        }
-    }
-}
 
 impl fmt::Display for NotChosen {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -16,8 +16,9 @@ use mimu_recording::error::{Error, Result};
 use mimu_recording::{NORMAL_95, Reference, ReferenceError};
 
 /// What errs in the reference.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, strum::IntoStaticStr)]
 #[serde(rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
 pub enum Cause {
     /// The assumed local gravity.
     Gravity,
@@ -38,15 +39,7 @@ pub enum Cause {
 impl Cause {
     /// In words.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Gravity => "gravity",
-            Self::Rate => "rate",
-            Self::Mounting => "mounting",
-            Self::Level => "level",
-            Self::Tilt => "tilt",
-            Self::Orthogonality => "orthogonality",
-            Self::Time => "time",
-        }
+        self.into()
     }
 }
 

@@ -30,10 +30,7 @@ impl AllanNoise {
             for (k, axis) in AXES.iter().enumerate() {
                 let name = format!("{sensor}_{axis}");
                 for channel in file.channel.iter().filter(|c| c.name == name) {
-                    let model = channel.model_in(sensor.unit()).map_err(|other| {
-                        let problem = format!("its unit is {}, not {}", other.found, sensor.unit());
-                        other.refused(format!("{}, channel {name}", file.place), problem)
-                    })?;
+                    let model = channel.model_in(sensor.unit(), &file.place)?;
                     let largest = |to: &mut f64, value: f64| *to = to.max(value);
                     largest(&mut noise.white[sensor][k], model.white);
                     largest(&mut noise.walk[sensor][k], 3.0 * model.walk);

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use super::closure::Closure;
 use super::component::{Cause, Component, FILTER, Kind};
+use super::estimates::Smoothed;
 use super::likelihood::{Model, Session};
 use super::{CauseFound, Density};
 use crate::quantity::{PerSensor, Sensor, significant};
@@ -121,22 +122,23 @@ fn attributed(session: &Session, best: &Fitted, included: &[(usize, f64)]) -> At
 
 /// Whether the error of the matrix of `sensor` is itself seen, on an element at least: where the force hardly changes, a large one and a bias are alike.
 fn is_seen(session: &Session, fitted: &Fitted, sensor: Sensor) -> bool {
-    let Some(estimated) = session.smoothed(&session.model(fitted, true)) else {
-        return false;
-    };
-    let own = estimated.middle();
-    super::state::matrix(sensor).any(|k| own.value(k).abs() > SEEN * own.sigma(k))
+    let estimated = session.smoothed(&session.model(fitted, true));
+    let own = estimated.as_ref().and_then(Smoothed::middle);
+    own.is_some_and(|own| {
+        super::state::matrix(sensor).any(|k| own.value[k].abs() > SEEN * own.sigma[k])
+    })
 }
 
 /// The estimated relative error of the matrix of `sensor` on its worst axis: the norm of a row of `E`, where `E C` is the error of C.
 fn matrix_error(session: &Session, best: &Fitted, sensor: Sensor) -> f64 {
     let estimated = session.smoothed(&session.model(best, true));
     let inverse = session.matrices[sensor].try_inverse();
-    let (Some(estimated), Some(inverse)) = (estimated, inverse) else {
+    let own = estimated.as_ref().and_then(Smoothed::middle);
+    let (Some(own), Some(inverse)) = (own, inverse) else {
         return f64::NAN;
     };
-    let (own, from) = (estimated.middle(), super::state::matrix(sensor).start);
-    let error = Matrix3::from_fn(|i, j| own.value(from + 3 * i + j)) * inverse;
+    let from = super::state::matrix(sensor).start;
+    let error = Matrix3::from_fn(|i, j| own.value[from + 3 * i + j]) * inverse;
     let rows = error.row_iter().map(|row| row.norm());
     rows.fold(0.0, f64::max)
 }
@@ -175,7 +177,7 @@ fn weighted(
 }
 
 /// Unit of the size of a component, whose square root of variance it is.
-fn unit(component: &Component, k: usize) -> &'static str {
+pub(super) fn unit(component: &Component, k: usize) -> &'static str {
     let gyro = component.sensor == Some(Sensor::Gyro);
     match (component.cause, gyro) {
         (Cause::White, true) => "rad/s/sqrt(Hz)",

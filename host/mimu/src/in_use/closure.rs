@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::dead_reckoning::DeadReckoning;
-use super::linearisation::Linearisation;
+use super::estimates::Smoothed;
 use super::state::{self, By, STATES};
 use crate::quantity::{PerSensor, Sensor};
 
@@ -127,7 +127,7 @@ impl Closure {
     }
 
     /// The errors of the whole state, given those that remain without the `biases` and the mounting and clock of `about`.
-    pub fn about(mut self, about: &Linearisation, biases: &PerSensor<Vector3<f64>>) -> Self {
+    pub fn about(mut self, about: &Smoothed, biases: &PerSensor<Vector3<f64>>) -> Self {
         self.residual += &self.by * about.state(biases);
         self
     }

@@ -7,7 +7,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Matrix3};
 
 use super::closure::{Closure, scales};
 use super::component::{Component, Kind};
-use super::smoothed::{Smoothed, SmoothedState};
+use super::estimates::{Smoothed, SmoothedState};
 use super::state::{CLOCK, G_SENSITIVITY, GRAVITY, LEVER, MOUNTING, STATES, offset};
 use crate::estimate::earth;
 use crate::quantity::{PerSensor, Sensor};
@@ -124,7 +124,7 @@ impl Session {
             each.push(smoothed(segment, &x, &p));
         }
         each.reverse();
-        Some(Smoothed { each })
+        Some(Smoothed(each))
     }
 
     /// Runs the filter; `each` receives what it knows after each segment.

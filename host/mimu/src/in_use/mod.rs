@@ -4,9 +4,8 @@
 //! |---|---|
 //! | `walk`, `dead_reckoning`, `state` | one pass over the samples: the errors of each segment, and what they depend on |
 //! | `rests`, `trajectory`, `trajectory_file`, `closure` | the errors against a reference: rests before and after, or a trajectory |
-//! | `linearisation`, `mounted` | the point about which the errors are linear, and the estimates there |
 //! | `allan_noise`, `component` | what is known of the noise, and the variances that the errors may have beyond it |
-//! | `likelihood`, `smoothed` | a filter over the segments, and its estimates |
+//! | `likelihood`, `estimates` | a filter over the segments; what a smoother estimates, about which the errors are linear |
 //! | `attribution`, `judged` | causes, and the errors of segments that were held out |
 
 mod allan_noise;
@@ -14,13 +13,11 @@ mod attribution;
 mod closure;
 mod component;
 mod dead_reckoning;
+mod estimates;
 mod judged;
 mod likelihood;
-mod linearisation;
-mod mounted;
 mod noise_file;
 mod rests;
-mod smoothed;
 mod state;
 mod trajectory;
 mod trajectory_file;
@@ -28,6 +25,7 @@ mod walk;
 
 pub use component::Cause;
 pub use trajectory_file::{Pose, Trajectory};
+pub use estimates::{Estimate, Mounted};
 pub use walk::VIBRATION_HZ;
 
 use nalgebra::{DMatrix, Matrix3};
@@ -44,20 +42,18 @@ use crate::warning::Warning;
 use allan_noise::AllanNoise;
 use closure::Closure;
 use component::{FILTER, REFERENCE_COUNT};
+use estimates::Smoothed;
 use likelihood::{Model, Session};
-use linearisation::Linearisation;
 use mimu_allan::model::Term;
 use mimu_recording::Recording;
 use mimu_recording::error::{Error, Result};
-pub use mounted::{Estimate, Mounted};
-use smoothed::Smoothed;
 
 /// Fewer segments show no variance.
 const FEWEST_SEGMENTS: usize = 6;
 /// The point of linearisation is that of the estimates if none is further from it than this, in its standard deviations.
 const SETTLED: f64 = 0.1;
 /// Passes over the samples. A bias of 4 deg/s takes four, a clock that is 60 ms off five.
-const MOST_PASSES: usize = 12;
+const MOST_PASSES: i32 = 12;
 
 /// What the errors are measured against.
 #[derive(Debug, Clone, Copy)]
@@ -183,75 +179,29 @@ pub fn noise_in_use(
     against: Against,
     progress: impl Fn(f64),
 ) -> Result<NoiseInUse> {
-    let place = recording.place.clone();
     for sensor in Sensor::BOTH {
         if calibration.inverse(sensor).is_none() {
             let problem = format!("the calibration has no {sensor}");
             let remedy = "dead reckoning needs both sensors: calibrate both";
-            return Err(Error::new(place, problem, remedy));
+            return Err(Error::new(&recording.place, problem, remedy));
         }
     }
-    let allan = AllanNoise::of(noise)?;
-    let sha256 = match against {
-        Against::Rests(prepared) => prepared.condensed.sha256.clone(),
-        Against::Trajectory(_) => recording.for_each_batch(|_| (), |_| Ok(()))?.sha256,
-    };
-    let reference = match against {
-        Against::Rests(_) => "rests",
-        Against::Trajectory(_) => "trajectory",
-    };
-    let linearised = |about: &Linearisation, progress: &dyn Fn(f64)| {
-        let (closures, left_out) = match against {
-            Against::Rests(prepared) => {
-                rests::closures(recording, prepared, calibration, &allan, about, progress)?
-            }
-            Against::Trajectory(poses) => {
-                trajectory::closures(recording, poses, calibration, &allan, about, progress)?
-            }
-        };
-        let has_positions = matches!(against, Against::Trajectory(poses) if poses.has_positions);
-        let session = Session {
-            earth_is_known: recording.manifest.latitude_deg.is_some(),
-            ..session(closures, calibration, &allan, reference, has_positions)
-        };
-        enough(&session, &place)?;
-        Ok((session, left_out))
-    };
-    let Linearised {
-        session,
-        left_out,
-        fitted,
-        smoothed,
-        is_settled,
-    } = linearised_where_it_settles(linearised, progress)?;
-    let judged = Judged {
+    let experiment = Experiment {
         recording,
-        sha256,
-        reference,
-        left_out,
-        fitted,
-        smoothed,
-        is_settled,
+        calibration,
+        allan: AllanNoise::of(noise)?,
+        against,
     };
-    Ok(found(&session, calibration, noise, &allan, &judged))
+    let found = experiment.linearised_where_it_settles(progress)?;
+    experiment.densities(noise, found)
 }
 
-/// Whether the segments are enough to show a variance.
-fn enough(session: &Session, place: &str) -> Result<()> {
-    let moving = session.moving().len();
-    if moving >= FEWEST_SEGMENTS {
-        return Ok(());
-    }
-    let problem = format!(
-        "{moving} segments have a reference at both ends, and at least {FEWEST_SEGMENTS} are needed"
-    );
-    let remedy = match session.mounted {
-        false => "hold the unit still before and after each motion, or give a trajectory",
-        true => {
-            "give the time of the trajectory at which the recording begins to count, --trajectory-zero: mimu import prints it"
-        }
-    };
-    Err(Error::new(place, problem, remedy))
+/// What the errors of dead reckoning are found on.
+struct Experiment<'a> {
+    recording: &'a Recording,
+    calibration: &'a Calibration,
+    allan: AllanNoise,
+    against: Against<'a>,
 }
 
 /// A session whose errors are linear about its own estimates.
@@ -265,73 +215,155 @@ struct Linearised {
     is_settled: bool,
 }
 
-/// Linearises about the estimates of a smoother until they stay: Gauss-Newton, with the densities fitted anew at each step, which are its weights.
-fn linearised_where_it_settles(
-    linearised: impl Fn(&Linearisation, &dyn Fn(f64)) -> Result<(Session, usize)>,
-    progress: impl Fn(f64),
-) -> Result<Linearised> {
-    let mut about = Linearisation::default();
-    let mut before: Option<Fitted> = None;
-    let mut passes = 0;
-    loop {
-        // The last step is as likely as not the third.
-        let share = |k: usize| 1.0 - 0.5_f64.powi(k as i32);
-        let [from, to] = [passes, passes + 1].map(share);
-        let (session, left_out) = linearised(&about, &|s| progress(from + s * (to - from)))?;
-        let fitted = session.filter_densities(before, |_| true);
-        let model = session.model(&fitted, false);
-        let smoothed = session.smoothed(&model).ok_or_else(|| {
-            let problem = "the errors of the segments cannot be weighed";
-            Error::new(
-                "noise in use",
-                problem,
-                "report this error: it is a mistake in the program",
-            )
-        })?;
-        let is_settled = about.distance(&smoothed) < SETTLED;
-        passes += 1;
-        if is_settled || passes == MOST_PASSES {
-            return Ok(Linearised {
-                session,
-                left_out,
-                fitted,
-                smoothed,
-                is_settled,
-            });
+impl Experiment<'_> {
+    /// Linearises about the estimates of a smoother until they stay: Gauss-Newton, with the densities fitted anew at each step, which are its weights.
+    fn linearised_where_it_settles(&self, progress: impl Fn(f64)) -> Result<Linearised> {
+        let mut about = Smoothed::default();
+        let mut before: Option<Fitted> = None;
+        for pass in 1.. {
+            // The last step is as likely as not the third.
+            let share = |k: i32| 1.0 - 0.5_f64.powi(k);
+            let [from, to] = [pass - 1, pass].map(share);
+            let (closures, left_out) =
+                self.closures(&about, &|s| progress(from + s * (to - from)))?;
+            let session = self.session(closures);
+            self.refuse_few(&session)?;
+            let fitted = session.filter_densities(before, |_| true);
+            let Some(smoothed) = session.smoothed(&session.model(&fitted, false)) else {
+                break;
+            };
+            let is_settled = about.distance(&smoothed) < SETTLED;
+            if is_settled || pass == MOST_PASSES {
+                return Ok(Linearised {
+                    session,
+                    left_out,
+                    fitted,
+                    smoothed,
+                    is_settled,
+                });
+            }
+            (about, before) = (smoothed, Some(fitted));
         }
-        about = Linearisation::of(&smoothed);
-        before = Some(fitted);
+        Err(Error::new(
+            "noise in use",
+            "the errors of the segments cannot be weighed",
+            "report this error: it is a mistake in the program",
+        ))
     }
-}
 
-fn session(
-    closures: Vec<Closure>,
-    calibration: &Calibration,
-    allan: &AllanNoise,
-    reference: &str,
-    has_positions: bool,
-) -> Session {
-    let mut covariance = DMatrix::zeros(24, 24);
-    for (k, sensor) in Sensor::BOTH.into_iter().enumerate() {
-        if let Some(own) = calibration.covariance(sensor) {
-            covariance
-                .view_mut((12 * k, 12 * k), (12, 12))
-                .copy_from(&own);
+    /// The segments about a point of linearisation, and the number of those that could not be used.
+    fn closures(&self, about: &Smoothed, progress: &dyn Fn(f64)) -> Result<(Vec<Closure>, usize)> {
+        match self.against {
+            Against::Rests(prepared) => rests::closures(self, prepared, about, progress),
+            Against::Trajectory(poses) => trajectory::closures(self, poses, about, progress),
         }
     }
-    let times: Vec<f64> = closures.iter().map(|c| c.at_s).collect();
-    let apart_s = match times[..] {
-        [first, .., last] => (last - first) / (times.len() - 1) as f64,
-        _ => 1.0,
-    };
-    Session {
-        components: component::all(allan.mean_white(), has_positions, reference == "rests"),
-        walks: allan.walks(apart_s.max(1e-3)),
-        calibration: covariance,
-        matrices: matrices(calibration),
-        mounted: reference == "trajectory",
-        earth_is_known: false,
-        closures,
+
+    fn session(&self, closures: Vec<Closure>) -> Session {
+        let mut covariance = DMatrix::zeros(24, 24);
+        for (k, sensor) in Sensor::BOTH.into_iter().enumerate() {
+            if let Some(own) = self.calibration.covariance(sensor) {
+                covariance
+                    .view_mut((12 * k, 12 * k), (12, 12))
+                    .copy_from(&own);
+            }
+        }
+        let times: Vec<f64> = closures.iter().map(|c| c.at_s).collect();
+        let apart_s = match times[..] {
+            [first, .., last] => (last - first) / (times.len() - 1) as f64,
+            _ => 1.0,
+        };
+        let (has_positions, mounted) = match self.against {
+            Against::Rests(_) => (false, false),
+            Against::Trajectory(poses) => (poses.has_positions, true),
+        };
+        Session {
+            components: component::all(self.allan.mean_white(), has_positions, !mounted),
+            walks: self.allan.walks(apart_s.max(1e-3)),
+            calibration: covariance,
+            matrices: matrices(self.calibration),
+            mounted,
+            earth_is_known: self.recording.manifest.latitude_deg.is_some(),
+            closures,
+        }
+    }
+
+    /// Refuses segments that are too few to show a variance.
+    fn refuse_few(&self, session: &Session) -> Result<()> {
+        let moving = session.moving().len();
+        if moving >= FEWEST_SEGMENTS {
+            return Ok(());
+        }
+        let problem = format!(
+            "{moving} segments have a reference at both ends, and at least {FEWEST_SEGMENTS} are needed"
+        );
+        let remedy = match self.against {
+            Against::Rests(_) => {
+                "hold the unit still before and after each motion, or give a trajectory"
+            }
+            Against::Trajectory(_) => {
+                "give the time of the trajectory at which the recording begins to count, --trajectory-zero: mimu import prints it"
+            }
+        };
+        Err(Error::new(&self.recording.place, problem, remedy))
+    }
+
+    fn densities(&self, noise: &NoiseFile, found: Linearised) -> Result<NoiseInUse> {
+        let (reference, sha256) = match self.against {
+            Against::Rests(prepared) => ("rests", prepared.condensed.sha256.clone()),
+            Against::Trajectory(_) => {
+                let read = self.recording.for_each_batch(|_| (), |_| Ok(()))?;
+                ("trajectory", read.sha256)
+            }
+        };
+        let session = &found.session;
+        let model = session.model(&found.fitted, false);
+        let search = session.search(false, |_| true);
+        let free: Vec<usize> = OF_FILTER.collect();
+        let ranges: Vec<[f64; 2]> = (0..FILTER)
+            .into_par_iter()
+            .map(|k| search.range(&found.fitted, k, &free))
+            .collect();
+        let attributed = attribution::of(session);
+        let densities = densities(session, &model, &ranges, &self.allan);
+        let nees = judged::consistency(session);
+        let moving: Vec<&Closure> = session.closures.iter().filter(|c| c.moves).collect();
+        let mean = |of: &dyn Fn(&Closure) -> f64| {
+            moving.iter().map(|c| of(c)).sum::<f64>() / moving.len() as f64
+        };
+        let total_s: f64 = moving.iter().map(|c| c.duration_s).sum();
+        let shaken: f64 = moving.iter().map(|c| c.vibration * c.duration_s).sum();
+        let manifest = &self.recording.manifest;
+        let fast = manifest.sample_rate_hz >= 4.0 * VIBRATION_HZ;
+        let judgement = match found.is_settled {
+            true => judged::judgement(session, &nees, &sha256, self.calibration),
+            false => judged::not_settled(),
+        };
+        let sentences = attribution::sentences(&densities, &attributed);
+        let warnings = self.calibration.other_unit(manifest).into_iter();
+        // Six segments have a middle.
+        let middle = found.smoothed.middle().unwrap_or(&found.smoothed.0[0]);
+        Ok(NoiseInUse {
+            format: "mimu-noise-in-use/1",
+            tool: crate::result::TOOL,
+            device: manifest.device.clone(),
+            noise_file: noise_file::of(noise, session, &model, &ranges, &judgement),
+            judgement,
+            reference,
+            segments: moving.len(),
+            segments_left_out: found.left_out,
+            segment_s: mean(&|c| c.duration_s),
+            turn_rad: mean(&|c| c.turned),
+            vibration_rms_mps2: fast.then(|| (shaken / total_s).sqrt()),
+            biases: middle.biases(),
+            mounted: session.mounted.then(|| middle.mounted()),
+            densities,
+            nees,
+            causes: attributed.causes,
+            share_of_calibration: attributed.share_of_calibration,
+            sentences,
+            warnings: warnings.collect(),
+        })
     }
 }
 
@@ -399,75 +431,6 @@ impl Session {
     }
 }
 
-/// What the errors were found on.
-struct Judged<'a> {
-    recording: &'a Recording,
-    /// Of its samples.
-    sha256: String,
-    /// `rests` or `trajectory`.
-    reference: &'static str,
-    /// Segments left out.
-    left_out: usize,
-    fitted: Fitted,
-    smoothed: Smoothed,
-    is_settled: bool,
-}
-
-fn found(
-    session: &Session,
-    calibration: &Calibration,
-    noise: &NoiseFile,
-    allan: &AllanNoise,
-    judged: &Judged,
-) -> NoiseInUse {
-    let fitted = &judged.fitted;
-    let model = session.model(fitted, false);
-    let search = session.search(false, |_| true);
-    let free: Vec<usize> = OF_FILTER.collect();
-    let ranges: Vec<[f64; 2]> = (0..FILTER)
-        .into_par_iter()
-        .map(|k| search.range(fitted, k, &free))
-        .collect();
-    let attributed = attribution::of(session);
-    let densities = densities(session, &model, &ranges, allan);
-    let nees = judged::consistency(session);
-    let moving: Vec<&Closure> = session.closures.iter().filter(|c| c.moves).collect();
-    let mean = |of: &dyn Fn(&Closure) -> f64| {
-        moving.iter().map(|c| of(c)).sum::<f64>() / moving.len() as f64
-    };
-    let total_s: f64 = moving.iter().map(|c| c.duration_s).sum();
-    let shaken: f64 = moving.iter().map(|c| c.vibration * c.duration_s).sum();
-    let manifest = &judged.recording.manifest;
-    let fast = manifest.sample_rate_hz >= 4.0 * VIBRATION_HZ;
-    let judgement = match judged.is_settled {
-        true => judged::judgement(session, &nees, &judged.sha256, calibration),
-        false => judged::not_settled(),
-    };
-    let sentences = attribution::sentences(&densities, &attributed);
-    let warnings = calibration.other_unit(manifest).into_iter();
-    NoiseInUse {
-        format: "mimu-noise-in-use/1",
-        tool: crate::result::TOOL,
-        device: manifest.device.clone(),
-        noise_file: noise_file::of(noise, session, &model, &ranges, &judgement),
-        judgement,
-        reference: judged.reference,
-        segments: moving.len(),
-        segments_left_out: judged.left_out,
-        segment_s: mean(&|c| c.duration_s),
-        turn_rad: mean(&|c| c.turned),
-        vibration_rms_mps2: fast.then(|| (shaken / total_s).sqrt()),
-        biases: mounted::biases(&judged.smoothed),
-        mounted: session.mounted.then(|| Mounted::of(&judged.smoothed)),
-        densities,
-        nees,
-        causes: attributed.causes,
-        share_of_calibration: attributed.share_of_calibration,
-        sentences,
-        warnings: warnings.collect(),
-    }
-}
-
 /// The four numbers, of the worst axes.
 fn densities(
     session: &Session,
@@ -491,12 +454,7 @@ fn densities(
             term: if is_white { "white" } else { "walk" },
             value,
             interval,
-            unit: match (sensor, is_white) {
-                (Sensor::Gyro, true) => "rad/s/sqrt(Hz)",
-                (Sensor::Gyro, false) => "rad/s^2/sqrt(Hz)",
-                (Sensor::Accel, true) => "m/s^2/sqrt(Hz)",
-                (Sensor::Accel, false) => "m/s^3/sqrt(Hz)",
-            },
+            unit: attribution::unit(&session.components[k], k),
             allan: reference,
             factor: reference.map(|r| value / r),
             factor_interval: reference.map(|r| interval.map(|v| v / r)),

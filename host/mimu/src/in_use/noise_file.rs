@@ -1,7 +1,7 @@
 //! The noise file of a unit in use, for the exports.
 
+use super::estimates::SIGMAS;
 use super::likelihood::{Model, Session};
-use super::mounted::SIGMAS;
 use crate::judgement::Judgement;
 use crate::noise::noise_file::{FileCoefficient, NoiseChannel, NoiseFile};
 use crate::quantity::Sensor;

@@ -2,17 +2,15 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, UnitVector3, Vector3};
 
-use super::AllanNoise;
 use super::closure::{Closure, Ends, by_first_attitude, rows_of};
 use super::dead_reckoning::DeadReckoning;
-use super::linearisation::Linearisation;
+use super::estimates::Smoothed;
 use super::state::{By, Readings, STATES};
 use super::walk::{Span, Walked, walk};
-use crate::calibration::Calibration;
+use super::{AllanNoise, Experiment};
 use crate::estimate::earth;
 use crate::prepared::Prepared;
 use crate::quantity::{PerSensor, Sensor};
-use mimu_recording::Recording;
 use mimu_recording::error::Result;
 
 /// Shorter dwells show neither gravity nor the gyro's bias, s.
@@ -22,13 +20,17 @@ const SEGMENT_S: [f64; 2] = [0.2, 120.0];
 
 /// The closures of a recording: its rests, and the segments between them, in order of time; and the number of segments that could not be used.
 pub(super) fn closures(
-    recording: &Recording,
+    experiment: &Experiment,
     prepared: &Prepared,
-    calibration: &Calibration,
-    noise: &AllanNoise,
-    about: &Linearisation,
-    progress: impl Fn(f64),
+    about: &Smoothed,
+    progress: &dyn Fn(f64),
 ) -> Result<(Vec<Closure>, usize)> {
+    let Experiment {
+        recording,
+        calibration,
+        allan: noise,
+        ..
+    } = experiment;
     let dwells = prepared.dwells.list.iter().filter(|d| {
         let sound = Sensor::BOTH.iter().all(|s| d.faults[*s].is_none());
         sound && !d.turn && !d.turns_slowly && !d.spins() && d.duration_s >= SHORTEST_REST_S

@@ -4,15 +4,13 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, UnitQuaternion, Vector3};
 
-use super::AllanNoise;
+use super::Experiment;
 use super::closure::{Closure, Ends, by_first_attitude};
 use super::dead_reckoning::DeadReckoning;
-use super::linearisation::Linearisation;
+use super::estimates::Smoothed;
 use super::state::{CLOCK, GRAVITY, LEVER, MOUNTING, Readings, STATES};
 use super::trajectory_file::{Pose, Trajectory};
 use super::walk::{Span, walk};
-use crate::calibration::Calibration;
-use mimu_recording::Recording;
 use mimu_recording::error::Result;
 
 /// Lengths of the segments, s, one after the other: what grows with time is then distinguished from what does not.
@@ -22,13 +20,17 @@ const APART_S: f64 = 0.2;
 
 /// The closures of a recording against `trajectory`, in order of time, and the number of segments that could not be used.
 pub(super) fn closures(
-    recording: &Recording,
+    experiment: &Experiment,
     trajectory: &Trajectory,
-    calibration: &Calibration,
-    noise: &AllanNoise,
-    about: &Linearisation,
-    progress: impl Fn(f64),
+    about: &Smoothed,
+    progress: &dyn Fn(f64),
 ) -> Result<(Vec<Closure>, usize)> {
+    let Experiment {
+        recording,
+        calibration,
+        allan: noise,
+        ..
+    } = experiment;
     let gravity = recording.manifest.gravity_mps2;
     let trajectory = &trajectory.of_unit(about);
     let segments = segments(&trajectory.poses);

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
-use super::linearisation::Linearisation;
+use super::estimates::Smoothed;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::read_text;
 
@@ -116,10 +116,10 @@ impl Trajectory {
     }
 
     /// The same for the unit, by the clock of the recording, if the reference is mounted and timed as `about`.
-    pub(super) fn of_unit(&self, about: &Linearisation) -> Self {
-        let turned = UnitQuaternion::from_scaled_axis(-about.mounting);
+    pub(super) fn of_unit(&self, about: &Smoothed) -> Self {
+        let turned = UnitQuaternion::from_scaled_axis(-about.mounting());
         let of = |pose: &Pose| Pose {
-            t_s: pose.t_s + about.clock_s,
+            t_s: pose.t_s + about.clock_s(),
             attitude: pose.attitude * turned,
             position: pose.position,
         };

@@ -1,6 +1,5 @@
 //! The noise file `mimu-noise/1`: the result of `mimu allan`, for the commands that use it.
 
-use std::fmt;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
@@ -25,10 +24,8 @@ pub struct NoiseFile {
     /// Unit under test.
     pub device: String,
     /// When it was made, RFC 3339.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub created: Option<String>,
     /// The judgement of the record, if it was made.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub judgement: Option<Judgement>,
     /// Samples a second.
     pub sample_rate_hz: f64,
@@ -52,10 +49,8 @@ pub struct NoiseChannel {
     /// Unit of its coefficients and of the deviations that they describe.
     pub unit: String,
     /// Unit of the readings, if a calibration converted them to [`Self::unit`].
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub raw_unit: Option<String>,
     /// Scale factor of that calibration, [`Self::raw_unit`] per [`Self::unit`].
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scale_factor: Option<f64>,
     /// Samples that it was computed from.
     pub samples: u64,
@@ -82,7 +77,6 @@ pub struct NoiseChannel {
     /// Why there is no rate ramp.
     pub r_reason: Option<String>,
     /// Upper end of the interval of a rate random walk that the record does not show, for programs that need a value.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub k_at_most: Option<f64>,
 }
 
@@ -130,7 +124,7 @@ impl NoiseChannel {
     /// [`Self::model`] in `unit` squared, which is the unit of the readings or of the calibrated readings.
     ///
     /// Errors: `unit` is another one.
-    pub fn model_in(&self, unit: &str) -> std::result::Result<AllanModel, OtherUnit> {
+    pub fn model_in(&self, unit: &str, place: &str) -> Result<AllanModel> {
         let model = self.model();
         if unit == self.unit {
             return Ok(model);
@@ -164,28 +158,10 @@ impl NoiseChannel {
                 None,
             ),
         };
-        Err(OtherUnit {
-            found,
-            remedy,
-            argument,
-        })
-    }
-}
-
-/// The noise is in another unit than the requested one.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct OtherUnit {
-    /// The unit that it is in.
-    pub found: String,
-    remedy: &'static str,
-    argument: Option<Argument>,
-}
-
-impl OtherUnit {
-    /// As an error at `place`.
-    pub fn refused(self, place: impl fmt::Display, problem: impl fmt::Display) -> Error {
-        let error = Error::new(place, problem, self.remedy);
-        self.argument.into_iter().fold(error, Error::about)
+        let problem = format!("its unit is {found}, and {unit} is needed");
+        let place = format!("{place}, channel {}", self.name);
+        let error = Error::new(place, problem, remedy);
+        Err(argument.into_iter().fold(error, Error::about))
     }
 }
 

@@ -11,12 +11,12 @@
 //! | [`closure`] | error of the heading after whole turns that end where they began | by the gyro, by the forces before and after, and so by the accelerometer |
 //! | [`turn`] | error of the direction of gravity after a turn, two components | by the gyro, by the forces before and after, and so by the accelerometer; by the Earth's level rate |
 //!
-//! A new kind is a file with a function that gives [`Block`], a row in this table, a case in the tests of `battery.rs`, and a variant of [`crate::factor::Kind`].
+//! A new kind is a file with a function that gives [`Block`], a row in this table, a case in `tests.rs`, and a variant of [`crate::factor::Kind`].
 
-#[cfg(test)]
-mod battery;
 pub mod closure;
 pub mod magnitude;
+#[cfg(test)]
+mod tests;
 pub mod turn;
 pub mod vector;
 

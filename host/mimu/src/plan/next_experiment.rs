@@ -13,8 +13,6 @@ pub mod prediction;
 pub mod recipe;
 pub mod words;
 
-use std::fmt;
-
 use rayon::prelude::*;
 use serde::{Serialize, Serializer};
 
@@ -67,21 +65,14 @@ pub struct NotInPlan {
 }
 
 /// Why a plan does not show something. JSON has the sentence.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]
 pub enum NotShown {
     /// No recipe determines it.
+    #[error("no recipe shows it")]
     NoRecipe,
     /// It can be shown, but not with what this recording was made with.
+    #[error("this needs a turntable")]
     Turntable,
-}
-
-impl fmt::Display for NotShown {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::NoRecipe => "no recipe shows it",
-            Self::Turntable => "this needs a turntable",
-        })
-    }
 }
 
 impl Serialize for NotShown {

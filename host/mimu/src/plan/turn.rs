@@ -4,8 +4,9 @@ use nalgebra::{Rotation3, Vector3};
 use serde::{Deserialize, Serialize};
 
 /// Axes of a table: the outer one is the vertical, the inner one the body's z axis, and the middle one lies across both.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, strum::IntoStaticStr)]
 #[serde(rename_all = "lowercase")]
+#[strum(serialize_all = "lowercase")]
 pub enum TableAxis {
     /// The vertical.
     Outer,
@@ -18,11 +19,7 @@ pub enum TableAxis {
 impl TableAxis {
     /// Name as in a plan.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Outer => "outer",
-            Self::Middle => "middle",
-            Self::Inner => "inner",
-        }
+        self.into()
     }
 }
 

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::TOOL;
 use crate::plan::design::Problem;
-use crate::plan::design::budget::{Budget, DwellNoise, Spending};
+use crate::plan::design::budget::{Budget, DwellNoise, Shares, Spending};
 use crate::plan::design::judgement::Judgement;
 use crate::plan::design::model::Setting;
 use crate::plan::design::reach::Fixture;
@@ -155,49 +155,11 @@ pub struct Spent {
     /// The budget, s.
     pub time_s: f64,
     /// The way with the smallest mean sigma.
-    pub best: Way,
+    pub best: Spending,
     /// The best with each number of dwells in a pass.
-    pub ways: Vec<Way>,
+    pub ways: Vec<Spending>,
     /// What the variance of a dwell mean consists of.
     pub shares: Shares,
-}
-
-/// One way to spend the time.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Way {
-    /// Dwells of one pass.
-    pub dwells_a_pass: usize,
-    /// Passes over the design.
-    pub passes: usize,
-    /// Length of each dwell, s.
-    pub dwell_s: f64,
-    /// Time of all moves, s.
-    pub moves_s: f64,
-    /// As [`Design::mean_sigma`], over all passes.
-    pub mean_sigma: f64,
-}
-
-/// Shares in the variance of a dwell mean; their sum is 1.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Shares {
-    /// White noise.
-    pub white: f64,
-    /// Bias instability.
-    pub instability: f64,
-    /// Rate random walk.
-    pub walk: f64,
-}
-
-impl From<&Spending> for Way {
-    fn from(of: &Spending) -> Self {
-        Self {
-            dwells_a_pass: of.each_pass(),
-            passes: of.passes,
-            dwell_s: of.dwell_s,
-            moves_s: of.moves_s,
-            mean_sigma: of.mean_sigma,
-        }
-    }
 }
 
 impl Design {
@@ -269,16 +231,11 @@ impl Design {
 
     /// The same, marked as the best way to spend a budget with this noise.
     pub fn within(mut self, time_s: f64, noise: &DwellNoise, budget: &Budget) -> Self {
-        let [white, instability, walk] = noise.shares(budget.best.dwell_s);
         self.budget = Some(Spent {
             time_s,
-            best: (&budget.best).into(),
-            ways: budget.by_size.iter().map(Way::from).collect(),
-            shares: Shares {
-                white,
-                instability,
-                walk,
-            },
+            best: budget.best.clone(),
+            ways: budget.by_size.clone(),
+            shares: noise.shares(budget.best.dwell_s),
         });
         self
     }

@@ -7,9 +7,12 @@ use crate::parameter::{ParameterKind, TriadParameter};
 use crate::quantity::{PerSensor, Sensor};
 
 /// A class of parts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, strum::IntoStaticStr,
+)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
+#[strum(serialize_all = "lowercase")]
 pub enum PartClass {
     /// Digital units of phones and drones.
     #[default]
@@ -34,10 +37,7 @@ impl PartClass {
 
     /// As in files.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Consumer => "consumer",
-            Self::Tactical => "tactical",
-        }
+        self.into()
     }
 
     /// Where its figures come from.

@@ -149,13 +149,6 @@ pub enum Fault {
     NoThermometer,
     /// Zeros of a thermometer that did not answer.
     SilentThermometer,
-    /// From a row on the accelerometer has another range, and reads so many times as much.
-    RangeChanged { ratio: f64 },
-    /// From a row on a column reads what another one read before.
-    ColumnsMoved {
-        now: &'static str,
-        before: &'static str,
-    },
     /// The gyro's readings follow the pose, and the accelerometer's do not.
     Exchanged,
 }
@@ -215,7 +208,6 @@ impl Finding {
             Fault::UnusualTemperatures { .. } => "temperatures",
             Fault::NoThermometer => "no_thermometer",
             Fault::SilentThermometer => "silent_thermometer",
-            Fault::RangeChanged { .. } | Fault::ColumnsMoved { .. } => "log_fault",
             Fault::Exchanged => "exchanged",
         }
     }
@@ -242,12 +234,11 @@ impl Finding {
 
     /// Settings of an import that its remedy is about.
     fn settings(&self) -> &'static [Argument] {
-        use Argument::{Columns, Rows, TrustReadings, TwosComplement, Where};
+        use Argument::{Columns, TrustReadings, TwosComplement, Where};
         match self.fault {
             Fault::AllZero => &[Columns],
             Fault::Alternating { .. } => &[Where, Columns, TrustReadings],
             Fault::Unsigned => &[TwosComplement, TrustReadings],
-            Fault::RangeChanged { .. } | Fault::ColumnsMoved { .. } => &[Rows, TrustReadings],
             Fault::SignedLowByte => &[Argument::SignedLowByte, TrustReadings],
             Fault::NoTemperatures { .. } => &[Argument::Scale, Argument::Offset],
             _ => &[],

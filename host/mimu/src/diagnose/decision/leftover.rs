@@ -1,7 +1,5 @@
 //! Residual structure that nothing explains.
 
-use std::fmt;
-
 use nalgebra::{DMatrix, DVector};
 use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
@@ -40,34 +38,23 @@ pub struct Leftover {
 }
 
 /// What residuals correlate with.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum CorrelatesWith {
     /// A product or a jump that is reported and not removed, by its id.
+    #[error("{0}")]
     Effect(String),
     /// The reading.
+    #[error("reading")]
     Reading,
     /// Time.
+    #[error("time: the bias wanders")]
     Time,
     /// Nothing that was recorded: the dwells do not repeat.
+    #[error("no recorded quantity: the dwells do not repeat")]
     Nothing,
     /// Nothing that was recorded: within the dwells the channel is so many times as noisy as the noise file says.
+    #[error("no recorded quantity: within the dwells it is {} times as noisy as the noise file says", significant(*.0))]
     Noisier(f64),
-}
-
-impl fmt::Display for CorrelatesWith {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Effect(id) => f.write_str(id),
-            Self::Reading => f.write_str("reading"),
-            Self::Time => f.write_str("time: the bias wanders"),
-            Self::Nothing => f.write_str("no recorded quantity: the dwells do not repeat"),
-            Self::Noisier(times) => write!(
-                f,
-                "no recorded quantity: within the dwells it is {} times as noisy as the noise file says",
-                significant(*times)
-            ),
-        }
-    }
 }
 
 impl Serialize for Leftover {

@@ -1,7 +1,5 @@
 //! Effects in the form that the device takes, and back.
 
-use std::fmt;
-
 use mimu_core::RealField;
 use mimu_core::effects::{DeviceEffect, EffectError, Variable};
 use mimu_core::wire::EFFECTS;
@@ -12,31 +10,20 @@ use crate::effects::candidate::CandidateKind;
 use crate::effects::quantity::Quantity;
 
 /// Why no device removes an effect.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum NotOnDevice {
     /// No device has its law.
+    #[error("devices do not remove this effect")]
     NoLaw,
     /// No device has a factor of the product.
+    #[error("it has a factor that devices do not know")]
     NoFactor,
     /// It is a jump, which is over.
+    #[error("a bias that has jumped once may jump again, so the jump cannot be removed later")]
     Jump,
     /// A device has its law, but does not take its numbers: the first of these, with its name.
+    #[error("{0} is impossible: at 1 g, 1 rad/s and 10 K the effect would exceed the input")]
     Numbers(String),
-}
-
-impl fmt::Display for NotOnDevice {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Numbers(number) => {
-                return write!(f, "{number} is impossible: at 1 g, 1 rad/s and 10 K the effect would exceed the input");
-            }
-            Self::NoLaw => "devices do not remove this effect",
-            Self::NoFactor => "it has a factor that devices do not know",
-            Self::Jump => {
-                "a bias that has jumped once may jump again, so the jump cannot be removed later"
-            }
-        })
-    }
 }
 
 impl FittedEffect {

@@ -85,10 +85,7 @@ impl DwellNoise {
             ));
         }
         for channel in channels {
-            let model = channel.model_in(sensor.unit()).map_err(|other| {
-                let problem = format!("its unit is {}, not {}", other.found, sensor.unit());
-                other.refused(format!("{}, channel {}", file.place, channel.name), problem)
-            })?;
+            let model = channel.model_in(sensor.unit(), &file.place)?;
             let AllanModel {
                 white,
                 flicker,
@@ -135,9 +132,14 @@ impl DwellNoise {
     }
 
     /// Shares of white noise, floor and random walk in the variance of a dwell mean.
-    pub fn shares(&self, dwell_s: f64) -> [f64; 3] {
+    pub fn shares(&self, dwell_s: f64) -> Shares {
         let a = self.allan();
-        [a.white / dwell_s, a.flicker, a.walk * dwell_s].map(|v| v / a.variance(dwell_s))
+        let all = a.variance(dwell_s);
+        Shares {
+            white: a.white / dwell_s / all,
+            instability: a.flicker / all,
+            walk: a.walk * dwell_s / all,
+        }
     }
 }
 
@@ -150,30 +152,39 @@ fn filtered_density(variance: f64, corner_hz: f64, rate_hz: f64) -> f64 {
     variance / rate_hz * (1.0 + a) / (1.0 - a)
 }
 
+/// Shares in the variance of a dwell mean; their sum is 1.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Shares {
+    /// White noise.
+    pub white: f64,
+    /// Bias instability.
+    pub instability: f64,
+    /// Rate random walk.
+    pub walk: f64,
+}
+
 /// One way to spend the time.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Spending {
-    /// The settings of all dwells, in order.
+    /// Settings in their order, all passes.
+    #[serde(skip)]
     pub settings: Vec<Setting>,
+    /// Dwells of one pass.
+    pub dwells_a_pass: usize,
     /// Passes over the design.
     pub passes: usize,
     /// Length of each dwell, s.
     pub dwell_s: f64,
     /// Time of all moves, s.
     pub moves_s: f64,
-    /// Sigma of one dwell mean, SI unit.
+    /// Sigma of a dwell mean, SI.
+    #[serde(skip)]
     pub sigma: f64,
-    /// Normalised mean sigma of the parameters over all passes; see
-    /// [`super::judgement::Judgement::mean_sigma`].
+    /// Mean sigma of the parameters, over all passes.
     pub mean_sigma: f64,
 }
 
 impl Spending {
-    /// Dwells of one pass.
-    pub fn each_pass(&self) -> usize {
-        self.settings.len() / self.passes
-    }
-
     /// Time of all dwells and moves, s.
     pub fn time_s(&self) -> f64 {
         self.settings.len() as f64 * self.dwell_s + self.moves_s
@@ -260,6 +271,7 @@ impl Session {
         // A pass over dwells with the sigma of a mean over all passes.
         let mean = sigma / (passes as f64).sqrt();
         Some(Spending {
+            dwells_a_pass: pass.len(),
             passes,
             dwell_s,
             moves_s,

@@ -11,7 +11,8 @@ use crate::quantity::Sensor;
 use mimu_recording::Reference;
 
 /// Fixture: what holds the unit.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, strum::IntoStaticStr)]
+#[strum(serialize_all = "kebab-case")]
 pub enum Fixture {
     /// Three-axis turntable: every attitude, and a rate about the vertical.
     ThreeAxis,
@@ -30,12 +31,7 @@ const TILT_DEG: f64 = 95.0;
 impl Fixture {
     /// Name as on the command line.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::ThreeAxis => "three-axis",
-            Self::TwoAxis => "two-axis",
-            Self::Faces => "faces",
-            Self::Hand => "hand",
-        }
+        self.into()
     }
 
     /// Whether it can point `up` upwards.
