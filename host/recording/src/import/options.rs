@@ -3,11 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use super::faces::Face;
-use super::foreign::HowToRead;
 use super::log_options::{LogOptions, file_name, said_if};
 use super::per_column::Scale;
 use super::preset::{Chosen, PresetUse};
 use super::row_filter::RowFilter;
+use super::source::HowToRead;
 use crate::declared::{RawUnit, Reference};
 use crate::digest;
 use crate::error::{Argument, Error, Result};
@@ -275,9 +275,7 @@ impl ImportOptions {
             list: self.log.columns.get(source),
             filters: self.filters(source),
             rows: self.log.rows.filter(|_| source == 0),
-            part: 0,
             rate_hz: self.log.rate_hz,
-            empty_zero_temperatures: false,
             skip_empty: self.has_one_file_for_all(),
         }
     }

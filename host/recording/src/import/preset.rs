@@ -20,8 +20,8 @@ use crate::cell::shorten;
 use crate::declared::RawUnit;
 use crate::error::{Argument, Error, Result};
 use crate::separator::Separator;
+use layout::Layout;
 pub use layout::Preset;
-use layout::{Layout, Rate};
 use table::PRESETS;
 
 /// Bytes at the start of a file that contain its header and the lines above it.
@@ -311,29 +311,16 @@ impl Preset {
 }
 
 impl Layout {
-    /// The sample rate that a line above the data or a file beside it contains, if this layout has such a line.
+    /// The sample rate that a line above the data contains, if this layout has such a line.
     fn rate_hz(&self, path: &Path, head: &str) -> Result<Option<f64>> {
-        let (found, problem, remedy) = match self.rate {
-            None => return Ok(None),
-            Some(Rate::Beside(ending, words)) => {
-                let beside = path.with_extension(ending);
-                let text = std::fs::read_to_string(&beside).unwrap_or_default();
-                let problem = format!(
-                    "{} beside it, with the sample rate after {words:?}, is missing or has none",
-                    beside.display()
-                );
-                let remedy = "put it beside the file, or name the columns and the rate";
-                (rate_after(&text, words), problem, remedy)
-            }
-            Some(Rate::Above(words)) => {
-                let problem =
-                    format!("no line above the data contains {words:?} with the sample rate");
-                let remedy = "export it with its header, or name the columns";
-                (rate_after(head, words), problem, remedy)
-            }
+        let Some(words) = self.rate_after else {
+            return Ok(None);
         };
-        let missing = || Error::new(path.display(), problem, remedy);
-        found.map(Some).ok_or_else(missing)
+        rate_after(head, words).map(Some).ok_or_else(|| {
+            let problem = format!("no line above the data contains {words:?} with the sample rate");
+            let remedy = "export it with its header, or name the columns";
+            Error::new(path.display(), problem, remedy)
+        })
     }
 
     /// Its columns in `path`, including the optional ones that are there. If a column is the time, the first row must have a time.
