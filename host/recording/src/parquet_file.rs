@@ -358,12 +358,22 @@ impl Cursor {
             Reader::DoubleColumnReader(reader) => append(reader, count, levels, values, |v| v),
             Reader::FloatColumnReader(reader) => append(reader, count, levels, values, f64::from),
             Reader::Int32ColumnReader(reader) => append(reader, count, levels, values, |v| {
-                if unsigned { v.cast_unsigned().into() } else { v.into() }
+                if unsigned {
+                    v.cast_unsigned().into()
+                } else {
+                    v.into()
+                }
             }),
             Reader::Int64ColumnReader(reader) => append(reader, count, levels, values, |v| {
-                if unsigned { v.cast_unsigned() as f64 } else { v as f64 }
+                if unsigned {
+                    v.cast_unsigned() as f64
+                } else {
+                    v as f64
+                }
             }),
-            _ => Err(ParquetError::General("the column contains no numbers".into())),
+            _ => Err(ParquetError::General(
+                "the column contains no numbers".into(),
+            )),
         })
     }
 

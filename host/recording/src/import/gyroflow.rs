@@ -20,13 +20,12 @@ use crate::columns::Column;
 use crate::error::{Argument, Error, Result};
 use crate::separator::Separator;
 use crate::triad_name::TriadName;
+use crate::units::STANDARD_GRAVITY;
 
 /// First lines of the format, the second without a maker's name.
 const TITLES: [&str; 2] = ["GYROFLOW IMU LOG", "CAMERA IMU LOG"];
 /// Factor of the stamps where the header has none, s.
 const TSCALE: f64 = 1e-3;
-/// What the format calls g.
-const GRAVITY: f64 = 9.80665;
 /// Gauss in µT.
 const GAUSS_UT: f64 = 100.0;
 /// Columns after the time. The accelerometer or the magnetometer may be missing.
@@ -51,19 +50,26 @@ fn read(path: &Path, choice: Choice<'_>) -> Result<Vec<Readings>> {
     let header = Header::read(path)?;
     let (tscale, triads) = (header.number("tscale")?.unwrap_or(TSCALE), header.triads()?);
     let named = |(triad, _): &(TriadName, f64)| [0, 1, 2].map(|axis| Column::of(*triad, axis));
-    let columns = [Column::Time].into_iter().chain(triads.iter().flat_map(named));
+    let columns = [Column::Time]
+        .into_iter()
+        .chain(triads.iter().flat_map(named));
     let list = columns.map(Role::Column).zip(header.names.iter().cloned());
     let list = ColumnList::ByName(list.collect());
     let mut table = Table::open(path, Some(&list), Some(Separator::Comma).into(), &[])?;
     let mut readings = Readings::of_triads(triads.iter().map(|(triad, _)| *triad));
     // A slower magnetometer may have empty cells.
-    let inertial = triads.iter().filter(|(triad, _)| *triad != TriadName::MAG).count();
+    let inertial = triads
+        .iter()
+        .filter(|(triad, _)| *triad != TriadName::MAG)
+        .count();
     let (mut cells, mut broken) = (Cells::default(), None);
     loop {
         match table.next(&mut cells) {
             Ok(None) => break,
             Ok(Some(_)) if cells.numbers[..=3 * inertial].iter().all(|v| v.is_finite()) => {
-                let scaled = cells.numbers[1..].iter().zip(triads.iter().flat_map(|(_, f)| [f; 3]));
+                let scaled = cells.numbers[1..]
+                    .iter()
+                    .zip(triads.iter().flat_map(|(_, f)| [f; 3]));
                 let stamp_ns = (cells.numbers[0] * tscale * 1e9).round() as i64;
                 readings.push(stamp_ns, scaled.map(|(value, factor)| value * factor));
             }
@@ -80,10 +86,14 @@ fn read(path: &Path, choice: Choice<'_>) -> Result<Vec<Readings>> {
         text("orientation")
     ));
     if !triads.iter().any(|(triad, _)| *triad == TriadName::ACCEL) {
-        readings.warnings.push("the log has no accelerometer".into());
+        readings
+            .warnings
+            .push("the log has no accelerometer".into());
     }
     if let Some((rows, first)) = broken {
-        readings.warnings.push(format!("{rows} rows without a number in each column were skipped, the first in line {first}"));
+        readings.warnings.push(format!(
+            "{rows} rows without a number in each column were skipped, the first in line {first}"
+        ));
     }
     Ok(vec![readings])
 }
@@ -97,10 +107,13 @@ struct Header<'a> {
 
 impl<'a> Header<'a> {
     fn read(path: &'a Path) -> Result<Self> {
-        let refuse = |problem: String, remedy: &str| Err(Error::new(path.display(), problem, remedy));
+        let refuse =
+            |problem: String, remedy: &str| Err(Error::new(path.display(), problem, remedy));
         let (head, _) = head::open(path, HEAD)?;
         let text = String::from_utf8_lossy(&head);
-        let mut lines = text.lines().map(|line| line.split(',').map(str::trim).collect::<Vec<_>>());
+        let mut lines = text
+            .lines()
+            .map(|line| line.split(',').map(str::trim).collect::<Vec<_>>());
         if !lines.next().is_some_and(|title| TITLES.contains(&title[0])) {
             let remedy = "give a log of Gyroflow, or rename the file to .csv and name its columns";
             return refuse(format!("it does not begin with {}", TITLES[0]), remedy);
@@ -110,10 +123,17 @@ impl<'a> Header<'a> {
             match cells.as_slice() {
                 ["t" | "time", names @ ..] if names.starts_with(&NAMES[..3]) => {
                     let names = cells.into_iter().map(str::to_owned).collect();
-                    return Ok(Self { path, values, names });
+                    return Ok(Self {
+                        path,
+                        values,
+                        names,
+                    });
                 }
                 ["t" | "time", ..] => {
-                    let problem = format!("its columns are {}, but a log of Gyroflow begins with t,gx,gy,gz", cells.join(","));
+                    let problem = format!(
+                        "its columns are {}, but a log of Gyroflow begins with t,gx,gy,gz",
+                        cells.join(",")
+                    );
                     return refuse(problem, "rename the file to .csv, and name its columns");
                 }
                 [key, value] => drop(values.insert((*key).to_owned(), (*value).to_owned())),
@@ -133,7 +153,11 @@ impl<'a> Header<'a> {
             Ok(value) if f64::is_finite(value) && value != 0.0 => Ok(Some(value)),
             _ => {
                 let problem = format!("{key} of its header is {text:?}, not a number");
-                Err(Error::new(self.path.display(), problem, "correct this line of the file"))
+                Err(Error::new(
+                    self.path.display(),
+                    problem,
+                    "correct this line of the file",
+                ))
             }
         }
     }
@@ -150,9 +174,11 @@ impl<'a> Header<'a> {
         let has = |count: usize| self.names[1..].iter().take(count).eq(&NAMES[..count]);
         let mut triads = vec![(TriadName::GYRO, factor("gscale", "rad/s")?)];
         if has(6) {
-            triads.push((TriadName::ACCEL, factor("ascale", "g")? * GRAVITY));
+            triads.push((TriadName::ACCEL, factor("ascale", "g")? * STANDARD_GRAVITY));
         }
-        if has(9) && let Some(gauss) = self.number("mscale")? {
+        if has(9)
+            && let Some(gauss) = self.number("mscale")?
+        {
             triads.push((TriadName::MAG, gauss * GAUSS_UT));
         }
         Ok(triads)

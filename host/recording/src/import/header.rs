@@ -307,7 +307,7 @@ impl Header {
         {
             let (sign, count) = (char::from(sign), filled.count());
             let problem = format!(
-                "all of its first {count} lines are taken as comments, because they begin with characters such as {sign}"
+                "all of its first {count} lines begin with {sign} or such characters, and are taken as comments"
             );
             let remedy =
                 "if they contain the readings, say that no character begins a comment: none";

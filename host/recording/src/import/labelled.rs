@@ -494,17 +494,4 @@ mod tests {
             )
         );
     }
-
-    #[test]
-    fn damaged_lines_are_distinguished_from_words() {
-        let lines = [&b"ax:1,ay:2"[..]; 3];
-        let mut samples = Samples::find(&lines).unwrap();
-        assert_eq!(samples.take(1, b"MPU6050 relaxed 1"), Taken::Words);
-        assert_eq!(samples.take(1, b"ax:1,ay:"), Taken::Damaged);
-        assert_eq!(samples.take(1, b"ax:1,ay:2"), Taken::Part(None));
-        assert_eq!(
-            samples.take(1, b"ax:3,ay:4"),
-            Taken::Part(Some((1, vec!["1".into(), "2".into()])))
-        );
-    }
 }

@@ -40,6 +40,7 @@ mod readings;
 mod ros;
 mod rotation;
 mod row_filter;
+mod row_limit;
 mod row_range;
 mod sequence;
 mod source;
@@ -53,13 +54,9 @@ mod table;
 mod tests;
 mod time;
 mod unit_names;
-#[cfg(not(feature = "bags"))]
-mod without_bags;
 #[cfg(not(feature = "parquet"))]
 mod without_parquet;
 
-#[cfg(not(feature = "bags"))]
-use without_bags as ros;
 #[cfg(not(feature = "parquet"))]
 use without_parquet as parquet_rows;
 

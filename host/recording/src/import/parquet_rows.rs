@@ -7,7 +7,7 @@ use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::record::Field;
 use parquet::record::reader::RowIter;
 
-use super::source::{MOST_ROWS, too_many_rows};
+use super::row_limit::{MOST_ROWS, too_many_rows};
 use crate::ahead::reader_panicked;
 use crate::csv_writer::write_number;
 use crate::error::{Error, Result};
@@ -92,7 +92,11 @@ impl ParquetRows {
 
     fn damaged(&self, error: &dyn std::fmt::Display) -> Error {
         let problem = format!("the file cannot be decoded: {error}");
-        Error::new(self.path.display(), problem, "make the file again from its source")
+        Error::new(
+            self.path.display(),
+            problem,
+            "make the file again from its source",
+        )
     }
 
     /// Share of the file that has been read.

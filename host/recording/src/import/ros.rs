@@ -343,7 +343,7 @@ fn messages_of_bag(path: &Path) -> Result<Topics> {
     for record in bag.index_records() {
         if let IndexRecord::Connection(connection) = record.map_err(damaged)? {
             let topic = Topic::new(connection.storage_topic, connection.tp, "ros1");
-            topics.insert(connection.id, topic);
+            topics.entry(connection.id).or_insert(topic);
         }
     }
     for record in bag.chunk_records() {
@@ -419,7 +419,8 @@ fn messages_of_mcap(path: &Path) -> Result<Topics> {
                     Record::Channel(channel) => {
                         let kind = schemas.get(&channel.schema_id).map_or("", String::as_str);
                         let topic = Topic::new(&channel.topic, kind, &channel.message_encoding);
-                        topics.insert(u32::from(channel.id), topic);
+                        // A channel occurs again at the end of the file.
+                        topics.entry(u32::from(channel.id)).or_insert(topic);
                     }
                     Record::Message { header, data } => {
                         let received_ns = i64::try_from(header.log_time).unwrap_or(i64::MAX);

@@ -16,6 +16,7 @@ use super::per_column::{Offset, Scale, TwosComplement, Zero};
 use super::plausibility::Plausibility;
 use super::readings::Readings;
 use super::row_filter::RowFilter;
+use super::row_limit::{MOST_ROWS, too_many_rows};
 use super::row_range::RowRange;
 use super::step_labels::StepLabels;
 use super::table::{Cells, Table};
@@ -24,19 +25,10 @@ use crate::cell::{Refusal, is_reading, no_reading, no_time};
 use crate::columns::Column;
 use crate::error::{Argument, Error, Result};
 
-/// Most rows of a file: 28 h at 1 kHz. Compressed files of a few MB may hold many more.
-pub(super) const MOST_ROWS: u64 = 100_000_000;
 /// Rows after which the progress is reported.
 const REPORTED: u64 = 1 << 14;
 /// Assumed pause of a logger that started again, if its rows have no times, s.
 const PAUSE_S: f64 = 1.0;
-
-/// The refusal of a file with `count` rows.
-pub(super) fn too_many_rows(path: &Path, count: &str) -> Error {
-    let problem = format!("it has {count} rows, and at most {MOST_ROWS} fit into memory");
-    let remedy = "cut it into several files, or record at a lower rate";
-    Error::new(path.display(), problem, remedy)
-}
 
 /// How to read a foreign file.
 #[derive(Debug, Clone)]
@@ -54,8 +46,20 @@ pub(super) struct HowToRead<'a> {
     pub skip_empty: bool,
 }
 
-impl HowToRead<'_> {
-    fn conversion(&self, column: Column) -> Conversion {
+impl<'a> HowToRead<'a> {
+    /// Without a list of columns, filters or a rate.
+    pub fn of(log: &'a LogOptions) -> Self {
+        Self {
+            log,
+            list: None,
+            filters: Vec::new(),
+            rows: None,
+            rate_hz: None,
+            skip_empty: false,
+        }
+    }
+
+    pub fn conversion(&self, column: Column) -> Conversion {
         let log = self.log;
         let mut bits = TwosComplement::given(&log.twos_complement, column);
         Conversion {
