@@ -177,16 +177,13 @@ impl Log {
         };
         let each = (1..=TriadName::MOST).zip(self.instances(name));
         each.map(|(number, (instance, topic))| {
-            let kind = TriadKind::Mag;
-            let mut readings = Readings::of_triads([TriadName { kind, number }]);
-            for (stamp, values) in topic.stamps_ns.iter().zip(&topic.values) {
-                readings.push(*stamp, values.map(|gauss| gauss * GAUSS_UT));
-            }
             let (count, named) = (topic.values.len(), topic.named());
-            readings.notes.push(format!(
-                "{count} samples of {name} instance {instance} ({named}){said}"
-            ));
-            readings.sorted()
+            let note = format!("{count} samples of {name} instance {instance} ({named}){said}");
+            let values = topic
+                .values
+                .iter()
+                .map(|gauss| gauss.map(|gauss| gauss * GAUSS_UT));
+            Readings::of_mag(number, topic.stamps_ns.iter().copied().zip(values), note)
         })
         .collect()
     }
