@@ -13,7 +13,7 @@ use parquet::file::serialized_reader::SerializedPageReader;
 use parquet::schema::types::Type;
 
 use super::ahead::{ahead, reader_panicked};
-use super::batch::Batch;
+use super::batch::{Batch, SLICE};
 use super::cell::{self, Refusal, shorten};
 use super::columns::{Column, Layout};
 use super::strict_file::StrictFile;
@@ -21,9 +21,6 @@ use crate::error::{Error, Result};
 
 #[cfg(test)]
 mod tests;
-
-/// Rows that are decoded at a time: 1 MiB of numbers in each column.
-pub(super) const SLICE: usize = 1 << 17;
 
 /// Most numbers for which a column's vector is reserved in advance: half a GiB, which is used page by page as it fills.
 const MOST_RESERVED: u64 = 1 << 26;

@@ -9,7 +9,6 @@ use super::row_filter::{RowFilter, RowFilters};
 use crate::cell::{Refusal, shorten};
 use crate::columns::Column;
 use crate::error::{Argument, Error, Result};
-use crate::separator::Separator;
 
 /// Bytes at the start of a text file within which the data must begin.
 pub(super) const HEAD: u64 = 1 << 18;
@@ -53,6 +52,7 @@ impl Header {
     }
 
     /// The columns of a table whose `names` are known. Without `list` they must be those of a recording.
+    #[cfg(feature = "parquet")]
     pub fn of_names(
         path: &Path,
         names: Vec<String>,
@@ -61,7 +61,7 @@ impl Header {
         noticed: &mut Noticed,
     ) -> Result<Self> {
         let format = LineFormat {
-            separator: Separator::Comma,
+            separator: crate::separator::Separator::Comma,
             comments: Default::default(),
         };
         let mut header = Self::new(path, format, filters);
@@ -176,6 +176,7 @@ impl Header {
     }
 
     /// Positions of the cells that are read.
+    #[cfg(feature = "parquet")]
     pub fn positions(&self) -> impl Iterator<Item = usize> {
         let wanted = self.wanted.iter().map(|(at, _)| at);
         wanted.chain(&self.filtered).copied()

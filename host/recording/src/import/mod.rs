@@ -54,11 +54,6 @@ mod table;
 mod tests;
 mod time;
 mod unit_names;
-#[cfg(not(feature = "parquet"))]
-mod without_parquet;
-
-#[cfg(not(feature = "parquet"))]
-use without_parquet as parquet_rows;
 
 use std::path::Path;
 

@@ -7,7 +7,6 @@ use serde::Serialize;
 use super::head::{self, Kind, LineFormat};
 use super::labelled::{Line, Samples, UNITS};
 use super::log::is_log;
-use super::parquet_rows;
 use super::table::is_parquet;
 use crate::error::{Error, Result};
 use crate::separator::Separator;
@@ -49,12 +48,7 @@ pub fn preview(path: &Path, separator: Option<Separator>, most: usize) -> Result
         });
     }
     if is_parquet(path) {
-        let (names, rows) = parquet_rows::first_rows(path, most)?;
-        return Ok(Preview {
-            names,
-            rows,
-            ..Preview::default()
-        });
+        return of_parquet(path, most);
     }
     let enough = (1 << 16) + ROW * most as u64;
     let (head, _) = head::open(path, enough)?;
@@ -65,6 +59,21 @@ pub fn preview(path: &Path, separator: Option<Separator>, most: usize) -> Result
         let remedy =
             "give a text file with one sample a line, Parquet, or a log with its usual ending";
         Error::new(path.display(), problem, remedy)
+    })
+}
+
+#[cfg(not(feature = "parquet"))]
+fn of_parquet(path: &Path, _: usize) -> Result<Preview> {
+    Err(crate::writer::without_parquet(path))
+}
+
+#[cfg(feature = "parquet")]
+fn of_parquet(path: &Path, most: usize) -> Result<Preview> {
+    let (names, rows) = super::parquet_rows::first_rows(path, most)?;
+    Ok(Preview {
+        names,
+        rows,
+        ..Preview::default()
     })
 }
 
