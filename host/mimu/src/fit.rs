@@ -299,10 +299,14 @@ fn fit_as_prepared(mut prepared: Prepared, options: Options) -> Result<Fit> {
 /// The same, if the user does not.
 fn suspicions(prepared: &Prepared) -> Result<Vec<Warning>> {
     if prepared.manifest.trusts_readings() {
-        let found = prepared.condensed.signed_low_byte.iter();
+        let found = prepared.dwells.fault.iter();
+        let found = found.chain(&prepared.condensed.signed_low_byte);
         return Ok(found.copied().map(Warning::Health).collect());
     }
-    plausible::check_readings(prepared).map(|()| Vec::new())
+    match &prepared.dwells.fault {
+        Some(fault) => Err(fault.refusal(&prepared.place)),
+        None => plausible::check_readings(prepared).map(|()| Vec::new()),
+    }
 }
 
 /// Moves what the accelerometer read before the last power-on to the bias of the last, if the poses determine both. The fit finds what remains of the

@@ -8,6 +8,7 @@ use crate::prepared::Prepared;
 use crate::quantity::{PerSensor, Sensor};
 use crate::signal::blocks::{Block, Condensed, Level, Moments};
 use crate::signal::dwell::{Dwell, Dwells, Fault, Keep, Mean};
+use crate::signal::jump::Jump;
 use crate::warning::Warning;
 use mimu_recording::error::Result;
 use mimu_recording::{Column, PoseMean, PoseMeans, Reference};
@@ -52,6 +53,7 @@ impl Prepared {
             warnings: warnings(&list, means, &has_raw),
             list,
             detection: None,
+            fault: None,
             rails: Default::default(),
             longest_run: [f64::INFINITY; 6],
             left_out: Vec::new(),
@@ -139,6 +141,7 @@ fn block(dwell: &Dwell, pose: &PoseMean) -> Block {
             max: mean.mean,
             ..Moments::default()
         }),
+        jump: Jump::default(),
         reference: pose.reference.map(level),
         temp_c: level(pose.temp_c),
     }

@@ -69,6 +69,10 @@ pub enum Seen {
     EmptySamples,
     /// Values of the thermometer that cannot be temperatures.
     Temperatures,
+    /// Another range of the accelerometer from some row on.
+    RangeChange,
+    /// Columns that change places at some row.
+    ColumnsMoved,
 }
 
 impl Seen {
@@ -122,6 +126,8 @@ impl Seen {
             | health::Fault::NotCounts { .. }
             | health::Fault::Turning { .. } => Self::Unit,
             health::Fault::NoTemperatures { .. } => Self::Temperatures,
+            health::Fault::RangeChanged { .. } => Self::RangeChange,
+            health::Fault::ColumnsMoved { .. } => Self::ColumnsMoved,
             health::Fault::Held { .. } => Self::HeldReadings,
             _ => return None,
         })

@@ -7,6 +7,8 @@ pub(crate) mod course;
 pub mod dwell;
 pub(crate) mod dwells_of_files;
 pub mod increment;
+pub mod jump;
+pub(crate) mod log_fault;
 pub mod moments;
 pub mod power_ons;
 pub mod quantisation_step;

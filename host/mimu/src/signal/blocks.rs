@@ -8,6 +8,7 @@ use nalgebra::Vector3;
 
 use crate::quantity::Sensor;
 use crate::signal::increment::{Increment, Integrator};
+use crate::signal::jump::Jump;
 pub(crate) use crate::signal::moments::pool;
 pub use crate::signal::moments::{Moments, Rails};
 use crate::signal::quantisation_step::QuantisationFinder;
@@ -91,6 +92,8 @@ pub struct Block {
     pub after_gap: bool,
     /// Gyro x, y, z, accelerometer x, y, z, raw.
     pub raw: [Moments; 6],
+    /// The largest change of the accelerometer's reading between two samples.
+    pub jump: Jump,
     /// Known inputs: rates (deg/s), specific forces (m/s²).
     pub reference: [Level; 6],
     /// Temperature, °C.
@@ -212,6 +215,8 @@ struct Condenser {
     open: Batch,
     open_after_gap: bool,
     last: Option<(f64, i32)>,
+    /// The accelerometer's last sample before the open block.
+    accel: Option<[f64; 3]>,
     integrator: Option<Integrator>,
     intervals: Intervals,
     quantisation_steps: [QuantisationFinder; 6],
@@ -245,6 +250,7 @@ impl Condenser {
             open: Batch::default(),
             open_after_gap: false,
             last: None,
+            accel: None,
             integrator: integrate.then(|| Integrator::new(period_s)),
             intervals: Intervals::default(),
             quantisation_steps: Default::default(),
@@ -429,6 +435,17 @@ impl Condenser {
                 self.out.missing[c] += column.len() as u64 - u64::from(raw[c].n);
             }
         }
+        let accel = Sensor::Accel.channels();
+        let last = |column: &Vec<f64>| column.last().copied();
+        let before = self.accel.filter(|_| !self.open_after_gap);
+        let jump = Jump::of(&open.raw[accel.clone()], open.first_row, before);
+        self.accel = match &open.raw[accel] {
+            [x, y, z] => last(x)
+                .zip(last(y))
+                .zip(last(z))
+                .map(|((x, y), z)| [x, y, z]),
+            _ => None,
+        };
         self.out.blocks.push(Block {
             first_row: open.first_row,
             rows: open.t_s.len() as u32,
@@ -437,6 +454,7 @@ impl Condenser {
             step: open.step.first().copied().unwrap_or(0),
             after_gap: self.open_after_gap,
             raw,
+            jump,
             reference: [0, 1, 2, 3, 4, 5].map(|c| Level::of(&open.reference[c])),
             temp_c: Level::of(&open.temp_c),
         });

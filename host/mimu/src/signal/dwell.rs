@@ -163,6 +163,8 @@ pub struct Dwells {
     pub list: Vec<Dwell>,
     /// How they were found; `None` if the `step` column gives them.
     pub detection: Option<Detection>,
+    /// A row from which on the readings mean something else; no fit uses such a recording.
+    pub fault: Option<health::Finding>,
     /// Rails of the six channels, as declared or as found.
     pub rails: [Rails; 6],
     /// Longest run of equal samples that chance explains, of the six channels; infinite if there is no such limit.
@@ -217,10 +219,12 @@ impl Dwells {
             leave_out_turning(&mut list, condensed);
             warnings.extend(mark_slow_turns(&mut list));
         }
+        warnings.extend(segments.fault.map(Warning::Health));
         warn(&list, manifest, &mut warnings);
         Ok(Self {
             list,
             detection: segments.detection,
+            fault: segments.fault,
             rails,
             longest_run,
             left_out: Vec::new(),
@@ -270,6 +274,7 @@ fn are_given(condensed: &Condensed, search: DwellSearch) -> Result<bool> {
 struct Segments {
     ranges: Vec<StepBlocks>,
     detection: Option<Detection>,
+    fault: Option<health::Finding>,
 }
 
 impl From<Vec<StepBlocks>> for Segments {
@@ -277,6 +282,7 @@ impl From<Vec<StepBlocks>> for Segments {
         Self {
             ranges,
             detection: None,
+            fault: None,
         }
     }
 }
@@ -289,7 +295,8 @@ impl Segments {
         search: DwellSearch,
         warnings: &mut Vec<Warning>,
     ) -> Result<Self> {
-        let (mut ranges, detection) = stillness::find(condensed, manifest, search.still_factor)?;
+        let found = stillness::find(condensed, manifest, search.still_factor)?;
+        let (mut ranges, detection) = (found.ranges, found.detection);
         let ends = match manifest.reference {
             Reference::Gravity => Some(rest::AT_ENDS),
             Reference::TurntableRate => Some(rest::AT_ENDS_OF_TURNS),
@@ -305,6 +312,7 @@ impl Segments {
         Ok(Self {
             ranges,
             detection: Some(detection),
+            fault: found.fault,
         })
     }
 

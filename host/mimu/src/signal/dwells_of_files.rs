@@ -19,7 +19,7 @@ pub(crate) fn number(
     manifest: &mut Manifest,
     factor: f64,
 ) -> Result<()> {
-    let (mut ranges, _) = stillness::find(condensed, manifest, factor)?;
+    let mut ranges = stillness::find(condensed, manifest, factor)?.ranges;
     rest::walk_in(&mut ranges, condensed, rest::AT_ENDS_OF_TURNS);
     let longest = condensed.blocks.iter().map(|b| b.rows).max().unwrap_or(1);
     let fewest = (SHORTEST_S / (f64::from(longest) * condensed.period_s)).round() as usize;

@@ -8,9 +8,11 @@ use crate::fault::SHORTEST_S;
 use crate::quantity::Sensor;
 use crate::signal::blocks::{Condensed, Level, StepBlocks, extent, quantile};
 use crate::signal::change_point;
+use crate::signal::log_fault;
 use crate::signal::rate_at_rest::RateAtRest;
 use crate::signal::window::{Window, in_bursts, windows};
 use mimu_recording::error::{Error, Result};
+use mimu_recording::health;
 use mimu_recording::statistics::mean_and_variance;
 use mimu_recording::{Manifest, Reference};
 
@@ -102,12 +104,24 @@ pub struct Detection {
     pub floor: [f64; 6],
 }
 
-/// Finds the still segments of a recording, in order.
+/// What [`find`] found.
+#[derive(Debug, Clone)]
+pub(crate) struct Segmentation {
+    /// The still segments, in order.
+    pub ranges: Vec<StepBlocks>,
+    /// The thresholds; if the log has a fault, those before it.
+    pub detection: Detection,
+    /// A fault of the log: no calibration holds before and after it.
+    pub fault: Option<health::Finding>,
+}
+
+/// Finds the still segments of a recording. The part before a fault of the log and the part after it are searched separately, because each
+/// has its own noise.
 pub(crate) fn find(
     condensed: &Condensed,
     manifest: &Manifest,
     factor: f64,
-) -> Result<(Vec<StepBlocks>, Detection)> {
+) -> Result<Segmentation> {
     let blocks = &condensed.blocks;
     let block_s = blocks.iter().map(|b| b.rows).max().unwrap_or(1) as f64 * condensed.period_s;
     let width = ((WINDOW_S / block_s).round() as usize).max(2);
@@ -136,7 +150,25 @@ pub(crate) fn find(
         channels,
         bursts,
     };
-    Ok(search.still(0..blocks.len()))
+    let (ranges, detection) = search.still(0..blocks.len());
+    let by_hand = manifest.reference == Reference::Gravity && condensed.has_raw[3];
+    let fault = by_hand
+        .then(|| log_fault::find(&search.quiet(), condensed, manifest))
+        .flatten();
+    let Some((fault, block)) = fault else {
+        return Ok(Segmentation {
+            ranges,
+            detection,
+            fault: None,
+        });
+    };
+    let (mut ranges, detection) = search.still(0..block);
+    ranges.extend(search.still(block + 1..blocks.len()).0);
+    Ok(Segmentation {
+        ranges,
+        detection,
+        fault: Some(fault),
+    })
 }
 
 /// A search for still segments.
@@ -183,6 +215,20 @@ impl Search<'_> {
             limits[c] = self.gyro_factor() * floor[c];
         }
         limits
+    }
+
+    /// Segments that hardly vary, whatever the gyro reads: rests before and after a fault of the log.
+    fn quiet(&self) -> Vec<Range<usize>> {
+        let part = 0..self.condensed.blocks.len();
+        let Some(floor) = Floor::of(self, &part) else {
+            return Vec::new();
+        };
+        let mut limits = self.limits(&floor.variance);
+        for c in Sensor::Accel.channels() {
+            limits[c] *= OTHER_RANGE;
+        }
+        let quiet = |_, w: &Window| self.channels.iter().all(|&c| w.variance[c] <= limits[c]);
+        self.segments(&part, quiet)
     }
 
     /// The still segments among the blocks `part`.
@@ -338,6 +384,9 @@ struct Floor {
     is_of_rests: bool,
 }
 
+/// Factor for the accelerometer's variance where a fault of the log is searched: in counts, noise is four times as large in a range a quarter
+/// as wide.
+const OTHER_RANGE: f64 = 16.0;
 /// Share of the windows that are the quietest.
 const QUIETEST: f64 = 0.05;
 /// Windows are alike if the product of their variances, without that of the channel that stands out most, differs by at most this factor:

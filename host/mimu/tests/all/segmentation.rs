@@ -3,11 +3,13 @@
 use mimu::fit::{Options, fit, fit_or_faces};
 use mimu::judgement::{Judgement, JudgementKind};
 use mimu::quantity::Sensor;
+use mimu::recording_problem::RecordingProblem;
 use mimu::signal::stillness::STILL_FACTOR;
 use mimu::triad::Angles;
 use mimu::turntable::RatedDwells;
 use mimu::warning::Warning;
 use mimu::{Manifest, Prepared, RawUnit, Reference, Samples};
+use mimu_recording::health::Fault;
 use mimu_recording::{Turntable, TurntableRate};
 use mimu_rig::random::Random;
 use nalgebra::{Matrix3, Rotation3, Vector3};
@@ -208,9 +210,74 @@ fn rests_before_a_channel_becomes_quiet_are_found() {
 }
 
 #[test]
+fn the_row_in_which_the_accelerometers_range_changes_is_named_and_neither_part_is_fitted_as_the_whole()
+ {
+    for (seed, factor) in [(6, 2.0), (7, 0.5), (8, 4.0)] {
+        let mut samples = Log::new(seed).session(30);
+        // In a turn, and in a rest.
+        let row = [6000, 5210][seed as usize % 2];
+        for column in &mut samples.raw[3..] {
+            column[row..]
+                .iter_mut()
+                .for_each(|u| *u = (*u * factor).round());
+        }
+        let prepared = by_hand(&samples).unwrap();
+        let fault = prepared.dwells.fault.expect("a fault");
+        assert_eq!(
+            (fault.rows.first, fault.fault),
+            (Some(row as u64 + 1), Fault::RangeChanged { ratio: factor })
+        );
+        let problems = RecordingProblem::without_fit(&prepared);
+        assert!(problems.iter().any(|p| p.id() == "range_change"));
+        let refused = fit(prepared, Options::default()).expect_err("two ranges");
+        assert!(
+            refused.to_string().contains(&format!("row {}", row + 1)),
+            "{refused}"
+        );
+        let part = by_hand(&first_rows(&samples, row)).unwrap();
+        assert_eq!(part.dwells.fault, None);
+        assert!(fit(part, Options::default()).is_ok());
+    }
+}
+
+#[test]
+fn the_row_in_which_columns_change_places_is_named_and_the_part_before_it_is_a_session() {
+    let samples = Log::new(9).session(36);
+    // In the order of the file: accelerometer, gyro. Two bytes are lost, so each column holds its neighbour from there on.
+    let order = [3, 4, 5, 0, 1, 2];
+    let row = 7310;
+    let mut shifted = samples.clone();
+    for (k, c) in order.into_iter().enumerate() {
+        let from = &samples.raw[order[(k + 1) % 6]];
+        shifted.raw[c][row..].copy_from_slice(&from[row..]);
+    }
+    let prepared = by_hand(&shifted).unwrap();
+    let fault = prepared.dwells.fault.expect("a fault");
+    assert_eq!(
+        (fault.rows.first, fault.fault),
+        (
+            Some(row as u64 + 1),
+            Fault::ColumnsMoved {
+                now: "accel_z",
+                before: "gyro_x"
+            }
+        )
+    );
+    let before = prepared.dwells.list.iter();
+    let before = before.filter(|d| (d.first_row as usize) < row).count();
+    let problems = RecordingProblem::without_fit(&prepared);
+    assert!(problems.iter().any(|p| p.id() == "columns_moved"));
+    assert!(fit(prepared, Options::default()).is_err());
+    let part = by_hand(&first_rows(&samples, row)).unwrap();
+    assert_eq!(used(&part), before);
+    assert!(fit(part, Options::default()).is_ok());
+}
+
+#[test]
 fn sessions_without_a_fault_of_the_log_have_none() {
     for seed in 20..30 {
         let prepared = by_hand(&Log::new(seed).session(25)).unwrap();
+        assert_eq!(prepared.dwells.fault, None);
         assert_eq!(used(&prepared), 25);
     }
 }

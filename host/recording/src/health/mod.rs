@@ -143,6 +143,13 @@ pub enum Fault {
     NoThermometer,
     /// Zeros of a thermometer that did not answer.
     SilentThermometer,
+    /// From a row on the accelerometer has another range, and reads so many times as much.
+    RangeChanged { ratio: f64 },
+    /// From a row on a column reads what another one read before.
+    ColumnsMoved {
+        now: &'static str,
+        before: &'static str,
+    },
     /// The gyro's readings follow the pose, and the accelerometer's do not.
     Exchanged,
 }
@@ -200,6 +207,7 @@ impl Finding {
             Fault::UnusualTemperatures { .. } => "temperatures",
             Fault::NoThermometer => "no_thermometer",
             Fault::SilentThermometer => "silent_thermometer",
+            Fault::RangeChanged { .. } | Fault::ColumnsMoved { .. } => "log_fault",
             Fault::Exchanged => "exchanged",
         }
     }
@@ -226,10 +234,11 @@ impl Finding {
 
     /// Settings of an import that its remedy is about.
     fn settings(&self) -> &'static [Argument] {
-        use Argument::{Columns, TrustReadings, TwosComplement};
+        use Argument::{Columns, Rows, TrustReadings, TwosComplement};
         match self.fault {
             Fault::AllZero => &[Columns],
             Fault::Unsigned => &[TwosComplement, TrustReadings],
+            Fault::RangeChanged { .. } | Fault::ColumnsMoved { .. } => &[Rows, TrustReadings],
             Fault::SignedLowByte => &[Argument::SignedLowByte, TrustReadings],
             Fault::NoTemperatures { .. } => &[Argument::Scale, Argument::Offset],
             _ => &[],

@@ -135,6 +135,14 @@ impl Finding {
             Fault::SignedLowByte => format!(
                 "{count} jumps between neighbouring samples show that readings whose low byte is 128 or more are 256 counts too low: the firmware reads the low byte as a signed number"
             ),
+            Fault::RangeChanged { ratio } => format!(
+                "from data row {} on the accelerometer reads {ratio} times as much at rest as before, so its range has changed",
+                self.rows.first.unwrap_or(1)
+            ),
+            Fault::ColumnsMoved { now, before } => format!(
+                "from data row {} on {now} reads what {before} read before, so the columns have changed places",
+                self.rows.first.unwrap_or(1)
+            ),
             Fault::Exchanged => {
                 "the gyro's readings follow the pose, but the accelerometer's do not".into()
             }
@@ -243,6 +251,13 @@ impl Finding {
                 "convert it to degrees Celsius (counts of an MPU-6050 or MPU-9150: a factor of 0.00294118 and an offset of 36.53), or skip the column"
             }
             Fault::NoThermometer | Fault::SilentThermometer => "check the thermometer's wiring",
+            Fault::RangeChanged { .. } | Fault::ColumnsMoved { .. } => {
+                let row = self.rows.first.unwrap_or(1);
+                return format!(
+                    "import the rows before it (..{}) or those from it on ({row}..) as a recording",
+                    row - 1
+                );
+            }
             Fault::Exchanged => "are the columns ax,ay,az and gx,gy,gz exchanged?",
         };
         remedy.into()
