@@ -238,6 +238,9 @@ pub struct TriadTable {
     pub C: [[f64; 3]; 3],
     /// SI.
     pub o: [f64; 3],
+    /// How firmware removes the bias before the reading is recorded. `o` and the biases are then those of such readings, and not of the sensor.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bias_removed: Option<String>,
     /// Standard deviations of C.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sigma_C: Option<[[f64; 3]; 3]>,

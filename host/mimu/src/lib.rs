@@ -55,6 +55,8 @@
 //! `Cargo.toml` needs this crate alone: `mimu = { path = "mimu/host/mimu" }`. Vectors and matrices are those of [`nalgebra`].
 
 #[doc(hidden)]
+pub mod bias_removal;
+#[doc(hidden)]
 pub mod calibration;
 #[doc(hidden)]
 pub mod data_sheet;

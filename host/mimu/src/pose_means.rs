@@ -68,6 +68,7 @@ impl Prepared {
                 Sensor::BOTH.map(|s| means.poses.iter().all(|p| knows_noise(p, s))),
             ),
             place: means.place.clone(),
+            bias_removal: None,
             power_ons: Default::default(),
             earth_on_table: None,
             prior: None,

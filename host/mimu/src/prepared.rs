@@ -5,6 +5,7 @@ use std::sync::Arc;
 use mimu_core::compensation::Affine;
 use nalgebra::{Matrix3, Vector3};
 
+use crate::bias_removal::BiasRemoval;
 use crate::estimate::earth::{Earth, poses};
 use crate::estimate::earth_on_table::EarthOnTable;
 use crate::estimate::whole_turns::Stated;
@@ -15,6 +16,7 @@ use crate::noise::noise_file::NoiseFile;
 use crate::observation::turn::{Motion, Rest, Turn};
 use crate::prior::Prior;
 use crate::quantity::Sensor;
+use crate::signal::bias_removal;
 use crate::signal::blocks::Condensed;
 use crate::signal::contrast::{Contrast, contrasts};
 use crate::signal::course::Course;
@@ -41,6 +43,8 @@ pub struct Prepared {
     pub noise: Noise,
     /// Path of the samples, for messages.
     pub place: String,
+    /// What the firmware did to the gyro's bias, if that shows. A high-pass filter is undone in [`Self::condensed`].
+    pub bias_removal: Option<BiasRemoval>,
     /// Errors of the reference.
     pub(crate) reference_error: Option<ReferenceError>,
     /// The Earth's rate in the dwells on a table; `None` without a table or a gyro.
@@ -131,6 +135,10 @@ impl Prepared {
             return Err(Error::new(place, problem, remedy));
         }
         let by_hand = manifest.reference == Reference::Gravity;
+        let bias_removal = by_hand.then(|| bias_removal::find(&condensed)).flatten();
+        if let Some(BiasRemoval::HighPass(filter)) = &bias_removal {
+            condensed = filter.undo(condensed);
+        }
         let find = |condensed: &Condensed| {
             Dwells::find(condensed, &manifest, search)
                 .map_err(|e| e.map(|e| e.place = format!("{place}, {}", e.place)))
@@ -149,6 +157,9 @@ impl Prepared {
         dwells
             .warnings
             .extend(in_si.into_iter().map(Warning::Health));
+        dwells
+            .warnings
+            .extend(bias_removal.map(Warning::BiasRemoved));
         let noise = Noise::within(&dwells.list, &condensed, &dwells.rails);
         let prepared = Self {
             power_ons: PowerOns::of(&dwells.list, spans),
@@ -158,6 +169,7 @@ impl Prepared {
             dwells,
             noise,
             place,
+            bias_removal,
             earth_on_table: None,
             prior: None,
         };

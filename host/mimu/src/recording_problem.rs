@@ -69,6 +69,8 @@ pub enum Seen {
     EmptySamples,
     /// Values of the thermometer that cannot be temperatures.
     Temperatures,
+    /// Firmware removes the bias of the gyro.
+    BiasRemoved,
     /// Another range of the accelerometer from some row on.
     RangeChange,
     /// Columns that change places at some row.
@@ -109,6 +111,7 @@ impl Seen {
                 fault: Fault::Missing(_),
                 ..
             } => Self::EmptySamples,
+            Warning::BiasRemoved(_) => Self::BiasRemoved,
             _ => return None,
         })
     }

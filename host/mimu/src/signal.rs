@@ -1,5 +1,6 @@
 //! From samples to the dwells and turns that a calibration is made of.
 
+pub mod bias_removal;
 pub mod blocks;
 pub(crate) mod change_point;
 pub(crate) mod contrast;

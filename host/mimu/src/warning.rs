@@ -13,6 +13,7 @@ use mimu_recording::{ClockRate, RAW_COLUMNS, RawUnit, TriadName};
 use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
 
+use crate::bias_removal::BiasRemoval;
 use crate::fault::Fault;
 use crate::quantity::{Sensor, duration, normal_gravity, p_value, plural, significant};
 
@@ -174,6 +175,11 @@ pub enum Warning {
     /// The horizontal component of the Earth's rate is in the intervals of the gyro's biases, because the heading was lost this often.
     #[error("the heading of the table is lost {} between dwells (samples are missing there, or the gyro clips), so the horizontal component of the Earth's rate is in the intervals of the biases: record the table's motion without gaps", plural(*.times as u64, "time"))]
     HeadingLost { times: usize },
+    /// Firmware removes the bias of the gyro before it is recorded.
+    #[error(
+        "gyro: {0}; its scale factors and angles are calibrated, but the bias is not that of the sensor, so none is given"
+    )]
+    BiasRemoved(BiasRemoval),
     /// Calibrated rate at rest, rad/s rms, by which dwells differ.
     #[error("from dwell to dwell the calibrated rate at rest differs by {} deg/s rms, more than any bias: in some dwells the unit turned evenly, about the vertical if the accelerometer shows nothing; leave these dwells out", degrees(*.rms))]
     Restless { rms: f64 },

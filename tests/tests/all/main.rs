@@ -1,6 +1,7 @@
 //! Estimators and diagnosis from recording to result, on the virtual bench and on real units.
 
 mod agreement;
+mod bias_removal;
 mod body;
 mod coverage;
 mod diagnosis;

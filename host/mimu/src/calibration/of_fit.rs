@@ -123,13 +123,18 @@ fn table(fit: &Fit, found: &SensorFit) -> TriadTable {
         condition: rounded(found.estimated.condition, SIGMA_DIGITS + 1),
     };
     let raw_unit = fit.prepared.manifest.raw_unit;
-    triad_table(
-        &found.estimated.triad,
-        found.sensor,
-        raw_unit,
-        frame,
-        judged,
-    )
+    let removal = fit.prepared.bias_removal;
+    let removal = removal.filter(|_| found.sensor == Sensor::Gyro);
+    TriadTable {
+        bias_removed: removal.map(|r| r.to_string()),
+        ..triad_table(
+            &found.estimated.triad,
+            found.sensor,
+            raw_unit,
+            frame,
+            judged,
+        )
+    }
 }
 
 /// The table of a triad whose axes are those of `frame`.
@@ -186,6 +191,7 @@ pub(super) fn exact_table(
         frame: frame.into(),
         C: by_rows(&triad.inverse.matrix),
         o: plain(&triad.inverse.offset),
+        bias_removed: None,
         sigma_C: None,
         sigma_o: None,
         interval_C: None,

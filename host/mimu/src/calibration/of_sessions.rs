@@ -117,7 +117,10 @@ fn table(
     let own = own.table(sensor).cloned().ok_or_else(missing)?;
     let judged = own.judged.clone().ok_or_else(missing)?;
     let made = of_fit::triad_table(&common.common, sensor, own.raw_unit, &own.frame, judged);
-    Ok(made.with_next_power_on(&common.next))
+    Ok(TriadTable {
+        bias_removed: own.bias_removed,
+        ..made.with_next_power_on(&common.next)
+    })
 }
 
 /// Error figures: of each session with the calibration of all, and with that of the others.

@@ -29,7 +29,8 @@ pub fn of_warning(warning: &Warning) -> Option<JudgementKind> {
         | Warning::WideTurn { .. }
         | Warning::RatesContradict { .. }
         | Warning::OtherUnit { .. }
-        | Warning::OtherDevice { .. } => Some(JudgementKind::Suspect),
+        | Warning::OtherDevice { .. }
+        | Warning::BiasRemoved(_) => Some(JudgementKind::Suspect),
         Warning::Health(finding) => of_finding(finding.fault),
         Warning::NoResiduals
         | Warning::FewResiduals

@@ -13,10 +13,10 @@
 //!
 //! A new kind is a file with a function that gives [`Block`], a row in this table, a case in `tests.rs`, and a variant of [`crate::factor::Kind`].
 
-pub mod closure;
-pub mod magnitude;
 #[cfg(test)]
 mod tests;
+pub mod closure;
+pub mod magnitude;
 pub mod turn;
 pub mod vector;
 

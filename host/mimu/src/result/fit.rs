@@ -378,16 +378,19 @@ impl Parameter {
     fn list(fit: &Fit, found: &SensorFit) -> Vec<Self> {
         let raw = fit.prepared.manifest.raw_unit;
         let all = parameters(&found.estimated.triad, found.sensor, raw).into_iter();
-        let each = all.map(|(of, e, unit)| Self {
-            of,
-            name: of.to_string(),
-            value: e.value,
-            sigma: e.sigma,
-            lower: e.value - e.interval,
-            upper: e.value + e.interval,
-            unit,
-        });
-        each.collect()
+        // What is left of a bias that firmware removed belongs to the firmware.
+        let removed = found.sensor == Sensor::Gyro && fit.prepared.bias_removal.is_some();
+        all.filter(|(of, ..)| !(removed && of.is_bias()))
+            .map(|(of, e, unit)| Self {
+                of,
+                name: of.to_string(),
+                value: e.value,
+                sigma: e.sigma,
+                lower: e.value - e.interval,
+                upper: e.value + e.interval,
+                unit,
+            })
+            .collect()
     }
 }
 
