@@ -10,6 +10,7 @@ use nalgebra::Vector3;
 use serde::Serialize;
 
 use super::received::{Answer, Event};
+use super::line::patience;
 use super::session::{PATIENCE, SILENCE, Session};
 use super::stream::Stream;
 use mimu::quantity::Sensor;
@@ -275,7 +276,7 @@ impl<'a> BankRun<'a> {
             {
                 return Ok(b.updates);
             }
-            if since.elapsed() > SILENCE {
+            if since.elapsed() > SILENCE * patience() {
                 let problem = "the Kalman bank does not report";
                 return Err(Error::device(self.session.port(), problem, "run it again"));
             }

@@ -46,6 +46,7 @@ pub use contents::{Contents, Inverse, NodeContents, calibration, contents};
 pub use flagged::Flagged;
 pub use identity::{Hash, Identity, Room, Started, StoredCalibration, TriadInfo, unit_name};
 pub use image::Image;
+pub use line::patience;
 pub use kalman::{Applied, AxisEstimate, Converging, KalmanPlan, KalmanRun, SHORTEST, kalman};
 pub use port::{BAUD, Port, Ports, SerialPair, ports, serial_pair};
 pub use received::{Answer, Event, LineCount, Received, Receiver, Samples};

@@ -74,18 +74,6 @@ fn an_accelerometer_off_the_origin_feels_the_second_derivative_of_its_own_positi
 }
 
 #[test]
-fn a_rotated_and_delayed_gyro_senses_earlier_rates_along_its_own_axes() {
-    let triad = pure("gyro2", "rotation_deg = [0, 0, 90]\ndelay_ms = 30");
-    let (plan, truth) = (hands(100.0, 4), truth(&triad, 5));
-    let rows: Vec<Row> = samples(&plan, &truth, 5).unwrap().collect();
-    for (k, row) in rows.iter().enumerate() {
-        // Three rows of 10 ms. Its x axis is the board's y.
-        let [x, y, z] = rows[k.saturating_sub(3)].instant.motion.rate;
-        assert_near(row.further[0], [y, -x, z], 1e-9);
-    }
-}
-
-#[test]
 fn a_compass_on_a_level_board_reads_the_field_of_the_earth_by_dip_and_heading() {
     let text = "format = \"mimu-plan/1\"\nsample_rate_hz = 100.0\ncarrier = \"table\"\n[[step]]\nup = [0, 0, 1]\ndwell_s = 0.1\n";
     let plan = Plan::parse(Source::new("PLAN.toml", text)).unwrap();
@@ -176,36 +164,6 @@ fn further_triads_leave_the_first_two_unchanged_bit_by_bit() {
 }
 
 #[test]
-fn the_relation_of_a_triad_leads_from_its_readings_to_the_input_in_the_first_frame() {
-    // The first accelerometer's own frame is the body's: its model is triangular. The second has a drawn model.
-    let text = "[unit]\naccel = \"MPU6050-accel\"\n\
-                [unit.accel_affine]\nmatrix = [[1600, 0, 0], [30, 1700, 0], [-20, 40, 1650]]\nbias = [5, -9, 60]\n\
-                [unit.accel_axes]\nbandwidth_hz = [inf, inf, inf]\n\
-                [[triad]]\nname = \"accel2\"\nrotation_deg = [100, -60, 90]\nlever_mm = [10, 20, 30]\ndelay_ms = 5\n\
-                [triad.axes]\nbandwidth_hz = [11.3682, 11.3682, 11.3682]\n";
-    for seed in 0..20 {
-        let truth = truth(text, seed);
-        let further = &truth.further[0];
-        let relation = further.relation(&truth.unit).unwrap();
-        let c = relation.inverse.matrix;
-        for above in [c[0][1], c[0][2], c[1][2]] {
-            assert!(above.abs() < 1e-9 * c[0][0], "{c:?}");
-        }
-        assert!(c[0][0] > 0.0 && c[1][1] > 0.0);
-        let (rows, bias) = further.triad.affine();
-        let input = [3.0, -7.0, 5.0];
-        let mounted = further.rotation.inverse().turn(input);
-        let raw: Vector = std::array::from_fn(|i| dot(rows[i], mounted) + bias[i]);
-        let own = std::array::from_fn(|i| dot(c[i], raw) + relation.inverse.offset[i]);
-        let back = Rotation::by(relation.rotation_deg.map(f64::to_radians)).turn(own);
-        assert_near(back, input, 1e-9);
-        assert_near(relation.lever_mm, [10.0, 20.0, 30.0], 1e-9);
-        // The delay, and 14 ms of its low-pass.
-        assert!((relation.delay_ms - 19.0).abs() < 1e-3, "{relation:?}");
-    }
-}
-
-#[test]
 fn the_truth_of_a_body_makes_the_same_samples_again_and_lists_its_calibration() {
     let folder = tempfile::tempdir().unwrap();
     let plan = hands(100.0, 3);
@@ -246,23 +204,4 @@ fn mistakes_in_a_body_are_refused_with_their_line_and_a_remedy() {
     for (text, complaint) in cases {
         assert_eq!(parse(text).unwrap_err(), format!("RIG.toml:{complaint}"));
     }
-}
-
-#[test]
-fn the_position_of_a_board_on_a_table_turns_with_its_offset() {
-    let text = "format = \"mimu-plan/1\"\nsample_rate_hz = 100.0\ncarrier = \"table\"\n[[step]]\nup = [0, 0, 1]\nrate_dps = 90\ndwell_s = 2\n";
-    let plan = Plan::parse(Source::new("PLAN.toml", text)).unwrap();
-    let mut file = parse("").unwrap();
-    file.table = TableTruth {
-        offset_mm: [100.0, 0.0, 0.0],
-        ..TableTruth::ideal()
-    };
-    let truth = RigTruth::resolve(&file, 1).unwrap();
-    let rows: Vec<Row> = samples(&plan, &truth, 1).unwrap().collect();
-    let moved = |k: usize| rows[k].instant.motion.position;
-    let middle = rows.len() - 50;
-    let velocity = scale(50.0, add(moved(middle + 1), scale(-1.0, moved(middle - 1))));
-    let rate = 90_f64.to_radians();
-    assert_near(velocity, cross([0.0, 0.0, rate], moved(middle)), 1e-4);
-    assert!((norm(moved(middle)) - 0.1).abs() < 1e-9);
 }

@@ -105,26 +105,6 @@ fn the_dies_warm_up_with_two_time_constants() {
     }
 }
 
-#[test]
-fn on_a_ramp_the_dies_lag_by_the_sum_of_the_lags() {
-    let (truth, dt, ramp) = (heat(f64::INFINITY), 0.5, 0.02);
-    let mut thermal = Thermal::new(&truth, dt);
-    let mut last = None;
-    for n in 0..20_000 {
-        last = Some((
-            dt * f64::from(n),
-            thermal.step(10.0 + ramp * dt * f64::from(n)),
-        ));
-    }
-    let (t, at) = last.unwrap();
-    let air = 10.0 + ramp * t;
-    assert!((at.board - (air + 5.0 - ramp * 300.0)).abs() < 1e-6);
-    for i in 0..4 {
-        let expected = air + 5.0 + truth.die_heating_c[i] - ramp * (300.0 + truth.die_lag_s[i]);
-        assert!((at.die[i] - expected).abs() < 1e-5);
-    }
-}
-
 /// Computed by hand: 16 bits, 3.3 V, divider 0.65 for the gyros.
 #[test]
 fn codes_are_rounded_and_end_at_the_range() {
@@ -260,26 +240,4 @@ fn a_stated_forward_model_is_exactly_what_the_unit_reads() {
         (variance - 1.0).abs() < 4.0 * (2.0 / f64::from(count)).sqrt(),
         "{variance}"
     );
-}
-
-#[test]
-fn a_rate_step_passes_the_gyro_with_the_lag_of_40_hertz() {
-    let quiet = QUIET.replacen(
-        "bandwidth_hz = [inf, inf, inf]",
-        "bandwidth_hz = [40, 40, 40]",
-        1,
-    );
-    let truth = truth(&quiet, 1);
-    let dt = 1e-3;
-    let mut unit = Unit::new(&truth.unit, 1, dt);
-    let axis = &truth.unit.gyro.axes[2];
-    let felt = |pins: Pins| (pins.gyro_v[2] - axis.null) / (axis.sensitivity * axis.direction[2]);
-    assert!(felt(unit.step(&still([0.0; 3], [0.0; 3]), 25.0)).abs() < 1e-12);
-    let tau = 1.0 / (TAU * 40.0);
-    let first = 1.0 - tau / dt * (1.0 - (-dt / tau).exp());
-    for n in 0..40 {
-        let now = felt(unit.step(&still([0.0, 0.0, 1.0], [0.0; 3]), 25.0));
-        let expected = 1.0 - (1.0 - first) * (-dt * f64::from(n) / tau).exp();
-        assert!((now - expected).abs() < 1e-9, "{now} {expected}");
-    }
 }

@@ -206,40 +206,6 @@ fn held_out_error_of_a_perfect_model_is_the_noise_and_that_of_the_parameters() {
     }
 }
 
-/// A sensor clips when its axis points up. Those dwells are left out, and the fit of the rest is not degraded.
-#[test]
-fn a_saturated_dwell_is_found_and_left_out() {
-    let mut random = Random::new(5, "unit");
-    let (gyro, accel) = (bench::gyro(&mut random), bench::accel(&mut random));
-    let highest =
-        accel.bias[2] + 9.80665 * accel.matrix[2].map(|p| p * p).iter().sum::<f64>().sqrt();
-    let rail = highest - 0.03;
-    let mut file = bench::clean(gyro, accel);
-    file.unit.accel_axes.high_raw = Some(rail);
-    let prepared = bench::recorded(&bench::hand_plan(30), &file, 5);
-    let found = prepared.dwells.rails[5].high.expect("a rail");
-    // To one sigma of the sensor's noise: 247 µg/√Hz at 100 Hz and 80 mV per m/s².
-    assert!((found - rail).abs() < 2e-3, "{found} for {rail}");
-    let faults = prepared
-        .dwells
-        .list
-        .iter()
-        .filter(|d| d.faults.accel.is_some());
-    let saturated = faults.count();
-    assert!((1..8).contains(&saturated), "{saturated}");
-    let fitted = fit(prepared, options(0)).unwrap();
-    let accel = fitted.sensor(Sensor::Accel).unwrap();
-    // Tight enough to detect a clipped dwell: the error of its mean is up to 0.03 V, or 0.4 m/s².
-    assert!(
-        accel.rms() < 2.0 * accel.noise_floor(),
-        "{} {}",
-        accel.rms(),
-        accel.noise_floor()
-    );
-    let told = |w: &Warning| w.to_string().contains("accel_z saturated");
-    assert!(fitted.warnings.iter().any(told), "{:?}", fitted.warnings);
-}
-
 /// If noise is correlated, dwell means scatter by more than sigma over the root of n. The Allan deviation must predict this.
 #[test]
 fn noise_of_a_dwell_mean_is_that_of_correlated_noise() {

@@ -311,58 +311,6 @@ fn a_temperature_that_nobody_records_is_named() {
 }
 
 #[test]
-fn the_command_makes_one_calibration_of_several_recordings_and_its_export_means_tomorrow() {
-    let folders = recorded(5, Life::PowerOn, 3);
-    let out = tempfile::tempdir().expect("a folder");
-    let [cal, json, header] = ["cal.toml", "fit.json", "cal.h"].map(|f| out.path().join(f));
-    let run = |arguments: &[&OsStr]| {
-        let all = std::iter::once(OsStr::new("mimu")).chain(arguments.iter().copied());
-        mimu_cli::run(all.map(OsStr::to_owned))
-    };
-    let recordings: Vec<_> = folders.iter().map(|f| f.path().join("recording")).collect();
-    let mut arguments: Vec<&OsStr> = vec!["fit".as_ref()];
-    arguments.extend(recordings.iter().map(|r| r.as_os_str()));
-    arguments.extend([
-        "-o".as_ref(),
-        cal.as_os_str(),
-        "--json".as_ref(),
-        json.as_os_str(),
-    ]);
-    assert_eq!(run(&arguments), 0);
-    let text = std::fs::read_to_string(&json).expect("JSON");
-    let found: serde_json::Value = serde_json::from_str(&text).expect("JSON");
-    assert_eq!(found["format"], "mimu-fit-sessions/1");
-    assert_eq!(found["sessions"].as_array().map(Vec::len), Some(3));
-    let parameters = found["sensors"]["gyro"]["parameters"].as_array();
-    for parameter in parameters.expect("a list") {
-        let number = |key: &str| parameter[key].as_f64().expect("a number");
-        let next = parameter["next_power_on"].as_array().expect("an interval");
-        let next: Vec<f64> = next.iter().filter_map(|x| x.as_f64()).collect();
-        let wider = next[0] < number("lower") && number("upper") < next[1];
-        assert!(wider, "{parameter}");
-        assert_eq!(parameter["sessions"].as_array().map(Vec::len), Some(3));
-    }
-    let export = [
-        "export".as_ref(),
-        "c".as_ref(),
-        "--calibration".as_ref(),
-        cal.as_os_str(),
-        "-o".as_ref(),
-        header.as_os_str(),
-    ];
-    assert_eq!(run(&export), 0);
-    let header = std::fs::read_to_string(&header).expect("a header");
-    assert!(header.contains("at the next power-on"), "{header}");
-    // One recording twice is no second session.
-    let twice = [
-        "fit".as_ref(),
-        recordings[0].as_os_str(),
-        recordings[0].as_os_str(),
-    ];
-    assert_eq!(run(&twice), 1);
-}
-
-#[test]
 fn the_model_predicts_left_out_sessions_as_often_as_it_says() {
     // Two sessions are judged with units drawn from their class.
     for (sessions, ratio) in [(2, 3.0), (3, 3.0), (5, 1.0), (8, 3.0)] {

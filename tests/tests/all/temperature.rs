@@ -255,39 +255,6 @@ fn intervals_of_a_lag_and_of_its_coefficients_hold_the_truth() {
     );
 }
 
-#[test]
-fn the_interval_of_a_lag_is_in_the_json_the_text_and_the_page() {
-    let found = diagnosed(lagging(3).1, None);
-    let result = DiagnosisResult::of(&found, &next(&found), None);
-    let lag = result
-        .effects
-        .iter()
-        .find(|e| e.effect.id() == "gyro_thermal_lag");
-    let form = lag
-        .and_then(|l| l.effect.nonlinear_parameter())
-        .expect("a lag");
-    let json = serde_json::to_value(&form).expect("JSON");
-    let [lower, upper] = ["lower", "upper"].map(|k| json[k].as_f64().expect("an end"));
-    assert!(lower < form.value && form.value < upper, "{json}");
-    let made = Made {
-        recording: "lagging".into(),
-        command: "mimu diagnose lagging".into(),
-        created: "2026-01-01T00:00:00Z".into(),
-    };
-    let interval = form.interval();
-    assert!(
-        diagnosis_text(
-            &result,
-            Detail {
-                all: true,
-                next: false
-            }
-        )
-        .contains(&format!("(95 %: {interval})"))
-    );
-    assert!(diagnosis_page(&result, &made).contains(&interval));
-}
-
 /// A calibration of `file` from a short recording at one temperature.
 fn short(file: &RigFile, seed: u64) -> Calibration {
     let plan = plan(&faces(&[-60.0, 60.0]), 1.5, &[[0.0, 25.0]]);

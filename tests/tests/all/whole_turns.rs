@@ -64,13 +64,6 @@ fn whole_turns_make_the_scale_factors_of_the_same_recording_more_certain() {
 }
 
 #[test]
-fn whole_turns_alone_give_the_scale_factors() {
-    let (turns, inside) = row(Grade::Consumer, Session::TURNS, 0..12);
-    assert!(turns < 0.001, "{turns}");
-    assert!(inside > 0.9, "{inside}");
-}
-
-#[test]
 #[ignore = "half an hour; prints what each minute buys"]
 fn what_whole_turns_buy() {
     let with = |turns| Session {
@@ -193,47 +186,6 @@ fn turns_that_all_end_short_are_not_taken_for_a_scale_factor() {
             .any(|w| w.contains("by the turns between rests"));
         assert!(none || contradicted, "{seed}: {told:?}");
     }
-}
-
-#[test]
-fn headings_that_scatter_more_than_stated_widen_the_intervals() {
-    let inside = (20..40).into_par_iter().map(|seed| {
-        let mut file = unit(&[], Grade::Consumer, seed);
-        file.hands.put_back_deg = 2.0;
-        let plan = Session::POSES_AND_TURNS.plan();
-        let stated = Some(WholeTurns::default());
-        let fitted = fit(recorded(&file, &plan, seed, stated), Options::IN_SAMPLE).unwrap();
-        scales(&fitted, &file, seed, &plan).inside
-    });
-    let inside: u32 = inside.sum();
-    println!("{inside} of 240");
-    assert!(inside >= 216, "{inside} of 240");
-}
-
-#[test]
-fn clipped_turns_are_refused_with_the_rate_not_to_exceed() {
-    let mut file = unit(&[], Grade::Consumer, 5);
-    // Twice as fast as the range of ±250 deg/s allows.
-    file.hands.whole_turn_s = [1.0, 1.2];
-    let plan = Session::POSES_AND_TURNS.plan();
-    let fitted = fit(
-        recorded(&file, &plan, 5, Some(WholeTurns::default())),
-        Options::IN_SAMPLE,
-    )
-    .unwrap();
-    let clipped: Vec<f64> = fitted
-        .all_warnings()
-        .filter_map(|w| match w {
-            Warning::WholeTurnClipped { fastest, .. } => Some(fastest.to_degrees()),
-            _ => None,
-        })
-        .collect();
-    println!("{clipped:?}");
-    assert_eq!(clipped.len(), 6);
-    assert!(
-        clipped.iter().all(|rate| (225.0..600.0).contains(rate)),
-        "{clipped:?}"
-    );
 }
 
 #[test]

@@ -143,57 +143,6 @@ fn without_a_number_the_plan_has_the_fewest_dwells_for_the_targets() {
 }
 
 #[test]
-fn a_budget_and_six_faces_count_the_prior() {
-    let folder = folder();
-    let budget = json(folder.path(), "--prior kind.toml --budget 1");
-    assert!(budget["time_s"].as_f64().unwrap() <= 60.0);
-    let ways = budget["budget"]["ways"].as_array().unwrap();
-    assert_eq!(ways[0]["dwells_a_pass"], 3);
-    let faces = json(folder.path(), "--prior kind.toml -n 6");
-    assert_eq!(faces["undetermined"].as_array().unwrap().len(), 0);
-    // Faces do not show angles: these remain what the population says.
-    let all = faces["sigma_per_parameter"].as_array().unwrap();
-    let angle = all.iter().find(|p| p["name"] == "C_zy").unwrap();
-    let share = angle["half_width_95"].as_f64().unwrap()
-        / angle["population_half_width_95"].as_f64().unwrap();
-    assert!(share > 0.9, "{share}");
-}
-
-#[test]
-fn people_read_both_half_widths_in_a_hundred_columns() {
-    let folder = folder();
-    for arguments in [
-        "--prior kind.toml",
-        "--prior kind.toml -n 3",
-        "--prior kind.toml -n 6 --noise 0.001",
-        "--prior unbiased.toml -n 20",
-        "--prior kind.toml --budget 5",
-    ] {
-        let short = text(folder.path(), arguments);
-        // The list of dwells is as long as the plan, three in a line.
-        let is_dwells = |l: &&str| l.trim_start().starts_with(|c: char| c.is_ascii_digit());
-        let others = short.lines().filter(|l| !is_dwells(l)).count();
-        assert!(others <= 26, "{arguments}: {others}\n{short}");
-        let long = text(folder.path(), &format!("{arguments} --verbose"));
-        for line in short.lines().chain(long.lines()) {
-            assert!(line.chars().count() <= 100, "{arguments}: {line}");
-        }
-        for says in ["of 60 units", "gyro", "brackets"] {
-            assert!(
-                short.contains(says) && long.contains(says),
-                "{says}: {short}"
-            );
-        }
-        assert!(!short.contains("NaN") && !long.contains("NaN"), "{long}");
-    }
-    let six = text(folder.path(), "--prior kind.toml -n 6");
-    // 1.96 × 0.8 %, 4 mrad, 20.4 mg.
-    says(&six, &["[15680]", "[7840]", "[40.0]"]);
-    let open = text(folder.path(), "--prior unbiased.toml -n 6");
-    says(&open, &["[open]", "nothing of the biases"]);
-}
-
-#[test]
 fn what_a_prior_is_not_for_is_refused_by_its_name() {
     let folder = folder();
     #[rustfmt::skip]

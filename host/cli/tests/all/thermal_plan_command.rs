@@ -60,15 +60,6 @@ fn nius_cycle_is_the_published_one() {
 }
 
 #[test]
-fn people_read_what_is_refused_and_what_is_inseparable() {
-    let folder = tempfile::tempdir().unwrap();
-    let out = mimu(folder.path(), "--procedure ramp --range 20..35");
-    out.refused(&["needs 20 K"]);
-    let out = mimu(folder.path(), "--procedure rest-ramp --range 0..50");
-    says(&out.stdout, &["inseparable: ", "not determined"]);
-}
-
-#[test]
 fn a_course_and_a_soak_both_ways_reach_the_plan() {
     let folder = tempfile::tempdir().unwrap();
     let (plan, json) = planned(

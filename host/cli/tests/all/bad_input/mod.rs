@@ -67,6 +67,13 @@ fn what_only_its_owner_can_judge_is_a_warning() {
     }
 }
 
+fn beginning_at(offset_s: f64) -> Samples {
+    let mut samples = by_hand();
+    let all = samples.all();
+    samples.edit("t_s", all, |t| t + offset_s);
+    samples
+}
+
 #[test]
 fn a_clean_recording_gives_the_truth_within_its_intervals_and_no_warning() {
     for (samples, arguments) in [
@@ -75,6 +82,10 @@ fn a_clean_recording_gives_the_truth_within_its_intervals_and_no_warning() {
         (by_hand(), vec!["--holdout", "blocks=1000"]),
         (on_table(), vec![]),
         (on_table(), vec!["--holdout", "blocks=0"]),
+        // One direction of each rate is enough, and times may begin anywhere.
+        (on_table_at(&[0.0, 30.0, 90.0], &[0, 1, 2]), vec![]),
+        (beginning_at(-1000.0), vec![]),
+        (beginning_at(1.7e9), vec![]),
     ] {
         let result = Place::with(&samples).fit(&arguments).json();
         right(&result);
@@ -83,12 +94,6 @@ fn a_clean_recording_gives_the_truth_within_its_intervals_and_no_warning() {
         let warnings: Vec<String> = warnings(&result).into_iter().filter(others).collect();
         assert_eq!(warnings, [""; 0], "{arguments:?}");
     }
-}
-
-#[test]
-fn one_direction_of_each_rate_is_enough() {
-    let samples = on_table_at(&[0.0, 30.0, 90.0], &[0, 1, 2]);
-    right(&Place::with(&samples).fit(&[]).json());
 }
 
 #[test]
@@ -121,14 +126,4 @@ fn a_sensor_that_is_not_there_cannot_be_fitted_alone() {
         .refused(&["samples.csv", "no gyro", "fit the other sensor"]);
     let result = Place::with(&on_table()).fit(&["--only", "accel"]).json();
     assert!(result["sensors"]["gyro"].is_null() && distance(&result, "accel") < 2.0);
-}
-
-#[test]
-fn times_may_begin_anywhere() {
-    for offset in [-1000.0, 1.7e9] {
-        let mut samples = by_hand();
-        let all = samples.all();
-        samples.edit("t_s", all, |t| t + offset);
-        right(&Place::with(&samples).fit(&[]).json());
-    }
 }

@@ -66,6 +66,8 @@ pub enum Act {
     Garble,
     /// The device restarts: it counts from 0 again and keeps only its calibration.
     Restart,
+    /// Nothing is sampled any more.
+    Hold,
     /// The port disappears.
     Vanish,
     /// The cable is pulled, and plugged in again after `away_ms`: a different port of the same name. The device continues meanwhile.
@@ -201,7 +203,6 @@ impl Peer {
             lost: 0,
             dropped: 0,
             calibrated: None,
-            banks: [None, None],
         };
         let thread = std::thread::spawn(move || device.run());
         Self {
@@ -258,7 +259,6 @@ struct Device {
     lost: u32,
     dropped: u32,
     calibrated: Option<Calibrated>,
-    banks: [Option<Running>; 2],
 }
 
 impl Device {

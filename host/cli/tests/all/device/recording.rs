@@ -140,7 +140,7 @@ fn dwells_by_time_begin_and_end_with_their_sample_and_parquet_holds_the_same() {
 
 /// Waits until the recording `rec` has so many bytes of samples. Returns how many it has.
 fn wait_for(place: &Place, bytes: u64) -> u64 {
-    let until = Instant::now() + Duration::from_secs(60);
+    let until = Instant::now() + Duration::from_secs(600);
     loop {
         let has = std::fs::metadata(place.path("rec/samples.csv")).map_or(0, |m| m.len());
         if has >= bytes {
@@ -157,7 +157,7 @@ fn interrupt(child: &Child) {
 }
 
 #[test]
-fn lines_on_standard_input_begin_and_end_dwells() {
+fn lines_on_standard_input_begin_and_end_dwells_and_ctrl_c_the_recording() {
     let place = Place::new();
     let peer = Peer::new(Script::default());
     let arguments = ["record", "--port", &peer.path, "-o", "rec", "--steps"];
@@ -177,7 +177,10 @@ fn lines_on_standard_input_begin_and_end_dwells() {
     more(2);
     interrupt(&child);
     assert!(child.wait().unwrap().success());
-    let (_, rows) = rows(&place, "rec");
+    let (recording, rows) = rows(&place, "rec");
+    assert!(!recording.manifest.unfinished);
+    check_rows(&rows);
+    assert_eq!(peer.count("Stop"), 1);
     let mut runs = rows.step.clone();
     runs.dedup();
     assert_eq!(runs, [-1, 0, -1, 1]);
@@ -186,20 +189,24 @@ fn lines_on_standard_input_begin_and_end_dwells() {
 #[test]
 fn a_killed_recording_is_there_up_to_the_last_second() {
     let place = Place::new();
-    let peer = Peer::new(Script::default());
+    let peer = Peer::new(Script {
+        acts: vec![(5_500, Act::Hold)],
+        ..Script::default()
+    });
     let mut child = start(&place, &["record", "--port", &peer.path, "-o", "rec"]);
-    // The time of the kill does not matter: the file is that long only if the rows are written.
-    wait_for(&place, 150_000);
     let samples = place.path("rec/samples.csv");
-    let sent = peer.seen.lock().unwrap().next;
+    // Of 5.5 s all but the last second are in the file, however slowly they come.
+    let mut bytes = 0;
+    let lines = || std::fs::read_to_string(&samples).map_or(0, |text| text.lines().count());
+    while lines() < 4_500 {
+        bytes = wait_for(&place, bytes + 1);
+    }
     // SIGKILL: no code of the program runs any more.
     child.kill().unwrap();
     child.wait().unwrap();
     let (recording, rows) = rows(&place, "rec");
     check_rows(&rows);
     assert!(gaps(&rows).is_empty());
-    let last = rows.t_s.last().unwrap() * 1000.0;
-    assert!(last + 1000.0 > f64::from(sent), "{last} of {sent}");
     assert!(recording.manifest.unfinished);
     let warning = recording.warnings[0].to_string();
     assert!(warning.contains("unfinished"), "{warning}");
@@ -299,20 +306,6 @@ fn a_port_that_vanishes_ends_the_recording_with_what_there_is() {
     assert!(!recording.manifest.unfinished);
     check_rows(&rows);
     assert!(rows.t_s.last().unwrap() - rows.t_s[0] > 7.5);
-}
-
-#[test]
-fn ctrl_c_ends_a_recording_and_does_not_cut_it() {
-    let place = Place::new();
-    let peer = Peer::new(Script::default());
-    let mut child = start(&place, &["record", "--port", &peer.path, "-o", "rec"]);
-    wait_for(&place, 100_000);
-    interrupt(&child);
-    assert!(child.wait().unwrap().success());
-    let (recording, rows) = rows(&place, "rec");
-    assert!(!recording.manifest.unfinished);
-    check_rows(&rows);
-    assert_eq!(peer.count("Stop"), 1);
 }
 
 #[test]
