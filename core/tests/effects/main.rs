@@ -228,63 +228,6 @@ fn bias<const N: usize>(effects: &Effects<f64, N>, state: &mut State<f64, N>) ->
 }
 
 #[test]
-fn drift_of_ten_hours_is_removed_to_the_last_digits_of_single_precision() {
-    let drift = [1e-7_f32, -2e-7, 3e-7];
-    let mut effects = Effects::<f32, 8>::new(&PerSensor::both(si())).unwrap();
-    for (axis, coefficient) in drift.into_iter().enumerate() {
-        let term = DeviceEffect::term(Sensor::Gyro, axis, coefficient, &[Variable::Time]);
-        effects.push(term.unwrap()).unwrap();
-    }
-    let mut state = State::new(1000.0);
-    for _ in 0..360_000 {
-        effects.slow(&mut state, 0.1, 25.0);
-    }
-    let zero = Vector3::zeros();
-    let clean = effects.remove(
-        &mut state,
-        &Sample {
-            gyro: zero,
-            accel: zero,
-        },
-    );
-    for i in 0..3 {
-        let moved = drift[i] * 36_000.0;
-        assert!((clean.gyro[i] + moved).abs() < 3e-7 * moved.abs());
-    }
-}
-
-#[test]
-fn long_after_power_on_a_warm_up_is_over_and_a_drift_counts_from_the_beginning() {
-    let warm_up = DeviceEffect::named("accel_warm_up", &[0.04, 0.0, -0.08], Some(100.0)).unwrap();
-    let drift = |axis, coefficient| {
-        DeviceEffect::term(Sensor::Accel, axis, coefficient, &[Variable::Time]).unwrap()
-    };
-    let effects = with(&[warm_up, drift(0, 1e-5), drift(2, 2e-5)], &si());
-    let mut state = State::new(1000.0).long_after_power_on();
-    effects.slow(&mut state, 0.0, f64::NAN);
-    assert_eq!(bias(&effects, &mut state), Vector3::zeros());
-    effects.slow(&mut state, 600.0, f64::NAN);
-    let expected = Vector3::new(6e-3, 0.0, 12e-3);
-    assert!((bias(&effects, &mut state) - expected).norm() < 1e-14);
-}
-
-#[test]
-fn an_effect_of_the_temperature_of_before_says_that_it_remembers() {
-    let named = |id: &str, nonlinear| {
-        let three = DeviceEffect::<f32>::named(id, &[1e-3; 3], nonlinear);
-        three.unwrap().remembers()
-    };
-    assert!(named("gyro_thermal_lag", Some(60.0)) && named("accel_thermal_lag", Some(60.0)));
-    assert!(!named("gyro_warm_up", Some(60.0)) && !named("gyro_scale_cubic", None));
-    let term = |variables: &[Variable]| {
-        let term = DeviceEffect::<f32>::term(Sensor::Gyro, 0, 1e-3, variables);
-        term.unwrap().remembers()
-    };
-    assert!(term(&[Variable::RateX, Variable::TemperatureRate]));
-    assert!(!term(&[Variable::RateX, Variable::Temperature]));
-}
-
-#[test]
 fn what_cannot_be_removed_is_refused() {
     let refused = |id, c: &[f64], form| DeviceEffect::named(id, c, form).unwrap_err();
     assert_eq!(
