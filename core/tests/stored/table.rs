@@ -1,13 +1,10 @@
 //! Curves between nodes, and beyond them, against cubics and lines in double precision.
 
 use mimu_core::PerSensor;
-use mimu_core::compensation::Sample;
-use mimu_core::single;
 use mimu_core::table::{BEYOND_C, Place, Table};
-use nalgebra::Vector3;
 use proptest::prelude::*;
 
-use super::{node, numbers_of, sloping, two_nodes};
+use super::{numbers_of, sloping, two_nodes};
 
 #[test]
 fn outside_the_nodes_the_end_slope_goes_on_for_five_kelvin_and_is_then_held() {

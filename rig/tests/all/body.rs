@@ -7,7 +7,7 @@ use mimu_rig::located::Source;
 use mimu_rig::plan::{Plan, Samples};
 use mimu_rig::record::{Output, Row, samples, write};
 use mimu_rig::rig_file::{RigFile, RigTruth};
-use mimu_rig::rotation::{Rotation, Vector, add, cross, dot, norm, scale};
+use mimu_rig::rotation::{Vector, add, norm, scale};
 use mimu_rig::table::TableTruth;
 
 fn parse(text: &str) -> Result<RigFile, String> {

@@ -1,7 +1,5 @@
 //! The sensors over temperature, against curves and branches written out here.
 
-use std::fs;
-use std::path::{Path, PathBuf};
 
 use mimu_rig::located::Source;
 use mimu_rig::motion::Motion;
@@ -152,35 +150,6 @@ fn hysteresis_goes_by_the_path_of_the_temperature_and_not_by_its_rate() {
     }
 }
 
-/// Lag of the reported temperature, and of the bias of the x gyro (1 deg/h/K from 25 °C), on a ramp of 2 K/min; and the lags according to the truth.
-fn late_on_a_ramp(thermal: &str) -> (f64, f64, [f64; 4]) {
-    let curves = "[curves.gyro]\nbias_deg_per_h = [[0, 1, 0, 0], [0, 0, 0, 0], [0, 0, 0, 0]]";
-    let text = format!(
-        "{}\n{curves}\n",
-        PLAIN
-            .replace(
-                "board_lag_s = 0.01\ndie_lag_s = [0.01, 0.01, 0.01, 0.01]\n",
-                ""
-            )
-            .replace("[unit]\n", &format!("{thermal}\n[unit]\n"))
-            .replace("format = \"mimu-rig/1\"\n", "")
-    );
-    let (keys, rest) = text.split_once("[unit]\n").unwrap();
-    let [unit_keys, thermal_keys] = keys.split_once('|').map(|(a, b)| [a, b]).unwrap();
-    let rest = rest.replace("[thermal]\n", &format!("[thermal]\n{thermal_keys}\n"));
-    let text = format!("format = \"mimu-rig/1\"\n[unit]\n{unit_keys}\n{rest}");
-    let file = RigFile::parse(&Source::new("RIG.toml", text)).unwrap();
-    let truth = RigTruth::resolve(&file, 1).unwrap();
-    let mut unit = Unit::new(&truth.unit, 1, 1.0);
-    let still = motion([0.0; 3], [0.0; 3]);
-    let mut last = (0.0, 0.0);
-    for s in 0..20_000 {
-        let pins = unit.step(&still, f64::from(s) / 30.0);
-        last = (pins.temp_c, pins.gyro_v[0] / DEG_PER_H);
-    }
-    (last.0, last.1, truth.unit.die_lag_behind_reported_s())
-}
-
 #[test]
 fn a_thermometer_that_sticks_or_jumps_leaves_everything_else_as_it_was() {
     let plan = "format = \"mimu-plan/1\"\nsample_rate_hz = 10\ncarrier = \"table\"\nchamber_c = [[0, 0], [100, 50]]\n\
@@ -228,10 +197,4 @@ fn what_is_wrong_with_curves_and_thermometer_is_named_with_its_line() {
         let found = RigFile::parse(&source).unwrap_err();
         assert!(found.contains(complaint), "{found}");
     }
-}
-
-fn example(folder: &str, name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join(folder)
-        .join(name)
 }

@@ -2,7 +2,6 @@
 
 use std::f64::consts::PI;
 
-use mimu_rig::filter::LowPass;
 use mimu_rig::noise::{Coefficients, Noise};
 
 /// Overlapping Allan variance at `m` samples, and its degrees of freedom for white noise, flicker noise and

@@ -1,15 +1,9 @@
 //! Rig files: drawn values, written values, refusals.
 
 use mimu_rig::catalog::sensors;
-use mimu_rig::converter::Converter;
 use mimu_rig::effects::specs;
-use mimu_rig::ideal::{Angles, Fang, Ideal, XU_TABLE_1, XU_TABLE_2};
 use mimu_rig::located::Source;
-use mimu_rig::motion::Motion;
 use mimu_rig::rig_file::{RigFile, RigTruth};
-use mimu_rig::rotation::{Rotation, Vector};
-use mimu_rig::sensor::TriadTruth;
-use mimu_rig::unit::Unit;
 
 fn parse(text: &str) -> Result<RigFile, String> {
     RigFile::parse(&Source::new(
@@ -21,16 +15,6 @@ fn parse(text: &str) -> Result<RigFile, String> {
 fn truth(text: &str, seed: u64) -> RigTruth {
     RigTruth::resolve(&parse(text).unwrap(), seed).unwrap()
 }
-
-/// Rotating slowly, 1 g up.
-const MOTION: Motion = Motion {
-    t_s: 0.0,
-    attitude: Rotation::NONE,
-    position: [0.0; 3],
-    rate: [0.1; 3],
-    angular_acceleration: [0.0; 3],
-    force: [0.0, 0.0, 9.8],
-};
 
 #[test]
 fn the_truth_is_a_rig_file_in_which_nothing_is_left_to_draw() {

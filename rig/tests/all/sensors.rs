@@ -1,6 +1,5 @@
 //! Heat, sensors and converter against closed forms.
 
-use std::f64::consts::TAU;
 
 use mimu_rig::converter::Converter;
 use mimu_rig::filter::LowPass;

@@ -7,7 +7,6 @@ use mimu::fit::{Options, fit};
 use mimu::quantity::Sensor;
 use mimu::signal::blocks::Condensed;
 use mimu::signal::stillness::STILL_FACTOR;
-use mimu::warning::Warning;
 use mimu_recording::{
     Batch, Columns, Manifest, RawUnit, Recording, Reference, SampleFormat, Writer,
 };

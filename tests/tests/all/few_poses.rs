@@ -5,7 +5,7 @@ use mimu::judgement::{Judgement, JudgementKind};
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
 use mimu::signal::dwell::Keep;
-use mimu::signal::stillness::{DwellSearch, STILL_FACTOR, Steps};
+use mimu::signal::stillness::STILL_FACTOR;
 use mimu::unseen::{BEYOND_NOISE, FALSE_ALARM, Test, Unseen};
 use mimu::warning::Warning;
 use mimu_recording::error::Error;

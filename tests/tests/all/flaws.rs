@@ -1,12 +1,9 @@
 //! Flaws of real recordings, made by the bench: each is detected, and the calibration is as good as without it.
 
 use mimu::fit::{Fit, Options, fit};
-use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
 use mimu::signal::dwell::{Dwell, Fault};
-use mimu::signal::stillness::STILL_FACTOR;
 use mimu::warning::Warning;
-use mimu_recording::{ImportOptions, RawUnit, Recording, Reference, import};
 use mimu_rig::located::Source;
 use mimu_rig::rig_file::RigFile;
 use mimu_tests::bench;

@@ -1,7 +1,5 @@
 //! Every kind of judgement, on recordings whose fault is made by the bench or by a driver that errs.
 
-use std::fs;
-use std::path::Path;
 
 use mimu::calibration::Calibration;
 use mimu::calibration::verify::{Causes, Share, Verification, verify};

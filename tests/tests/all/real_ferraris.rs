@@ -10,7 +10,7 @@ use mimu::quantity::Sensor;
 use mimu::triad::invert;
 use mimu_core::compensation::Affine;
 use mimu_recording::RawUnit;
-use mimu_tests::recordings::{Foreign, Samples, data_set, numbers, rms};
+use mimu_tests::recordings::{Foreign, Samples, data_set, numbers};
 use mimu_tests::says;
 use nalgebra::{Matrix3, Vector3};
 use tempfile::TempDir;

@@ -7,7 +7,7 @@ use mimu::quantity::Sensor;
 use mimu::triad::invert;
 use mimu_core::compensation::Affine;
 use mimu_tests::recordings::{
-    Models, Samples, data_set, dwell_rows, mikoff, numbers, rms, upper_triangular_frame, verdict,
+    Models, Samples, data_set, dwell_rows, mikoff, numbers, rms, upper_triangular_frame,
 };
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 

@@ -1,6 +1,5 @@
 //! Several sessions of one unit: what they predict, and what is named.
 
-use std::ffi::OsStr;
 
 use mimu::judgement::{Judgement, JudgementKind};
 use mimu::sessions::Sessions;
@@ -10,7 +9,7 @@ use mimu::{Calibration, Sensor, verify};
 use mimu_tests::says;
 use mimu_tests::sessions::{
     ARRAY_UNITS, Carrier, Life, Shares, by_others, by_single, losing, of_array, of_model, of_next,
-    on_bench, recorded, study,
+    on_bench, study,
 };
 use rayon::prelude::*;
 

@@ -6,7 +6,6 @@ use mimu::diagnose::rejected::Reason;
 use mimu::diagnose::{Diagnosis, Recordings, Verdict, diagnose};
 use mimu::fit::Options;
 use mimu::prepared::Prepared;
-use mimu::quantity::Sensor;
 use mimu::signal::stillness::STILL_FACTOR;
 use mimu_recording::RawUnit;
 use mimu_rig::rig_file::RigFile;

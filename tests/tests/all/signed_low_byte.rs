@@ -1,10 +1,7 @@
 //! A firmware on the bench that takes the low byte of a reading for a signed number: its readings are refused, and only those.
 
 use mimu::fit::{Options, fit};
-use mimu::prepared::Prepared;
-use mimu::signal::stillness::STILL_FACTOR;
 use mimu_recording::error::Argument;
-use mimu_recording::{ImportOptions, Recording, import};
 use mimu_rig::located::Source;
 use mimu_rig::rig_file::RigFile;
 use mimu_tests::bench;

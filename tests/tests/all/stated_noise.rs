@@ -2,12 +2,10 @@
 
 use mimu::fit::{Options, fit};
 use mimu::noise::noise_file::NoiseFile;
-use mimu::plan::design::budget::DwellNoise;
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
 use mimu::warning::Warning;
 use mimu_tests::bench;
-use mimu_tests::says;
 
 const SEED: u64 = 3;
 

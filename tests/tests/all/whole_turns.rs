@@ -4,7 +4,6 @@ use mimu::calibration::Calibration;
 use mimu::calibration::verify::verify;
 use mimu::fit::{Options, fit};
 use mimu::quantity::Sensor;
-use mimu::warning::Warning;
 use mimu_recording::WholeTurns;
 use mimu_tests::by_hand::{Grade, unit};
 use mimu_tests::whole_turns::{Session, case, recorded, scales};

@@ -3,8 +3,6 @@
 use mimu::calibration::Calibration;
 use mimu::calibration::body::BodyTriad;
 use mimu::calibration::comparison::{Comparison, compare};
-use mimu::warning::Warning;
-use mimu_recording::{Manifest, RawUnit, Reference, UNNAMED};
 use mimu_rig::random::Random;
 
 /// Standard deviation of a bias, V.

@@ -1,7 +1,6 @@
 //! Recordings at rest without a table: biases of the gyro, and the information that one pose gives about the accelerometer.
 
 use mimu::calibration::thermal_biases::ThermalBiases;
-use mimu::judgement::JudgementKind;
 use mimu::quantity::Sensor;
 use mimu::{Manifest, RawUnit, Reference, Samples};
 use mimu_thermal::fit::{FitVerdict, Options, ThermalFit, fit};

@@ -8,7 +8,7 @@ use mimu_thermal::base;
 use mimu_thermal::fit::{ThermalFit, fit};
 use nalgebra::Vector3;
 
-use crate::at_rest::{JOINT, at_rest, in_poses};
+use crate::at_rest::{JOINT, at_rest};
 use crate::says;
 use crate::session;
 use crate::simulation::{Experiment, GRAVITY, truth};

@@ -1,7 +1,6 @@
 //! The whole path of `mimu thermal fit`: verdicts, held-out errors, and the calibration file.
 
 use mimu::calibration::Calibration;
-use mimu::calibration::comparison::compare;
 use mimu::quantity::Sensor;
 use mimu_thermal::fit::{FitVerdict, Options, ThermalFit, fit};
 use mimu_thermal::judge::rms;

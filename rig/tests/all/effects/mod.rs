@@ -5,12 +5,12 @@ mod unlisted;
 
 use std::f64::consts::TAU;
 
-use mimu_rig::effects::{draw, size_range, specs};
+use mimu_rig::effects::{draw, specs};
 use mimu_rig::located::Source;
 use mimu_rig::motion::Motion;
 use mimu_rig::pins::Pins;
 use mimu_rig::rig_file::{RigFile, RigTruth};
-use mimu_rig::rotation::{Rotation, dot};
+use mimu_rig::rotation::Rotation;
 use mimu_rig::unit::Unit;
 
 const DPS: f64 = TAU / 360.0;

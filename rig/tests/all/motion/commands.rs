@@ -4,7 +4,7 @@ use mimu_rig::command::{Command, Commanded};
 use mimu_rig::hands::{Hands, HandsTruth};
 use mimu_rig::motion::{Carrier, Motion};
 use mimu_rig::plan::{Plan, TableAxis, Turn};
-use mimu_rig::rotation::{Vector, dot, norm, scale};
+use mimu_rig::rotation::{Vector, norm, scale};
 use mimu_rig::table::{Table, TableTruth};
 
 use super::table::{plan, table};

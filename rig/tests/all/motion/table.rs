@@ -1,15 +1,14 @@
 //! Turntables without flaws.
 
-use std::f64::consts::TAU;
 
 use mimu_rig::located::Source;
 use mimu_rig::motion::{Carrier, Instant};
 use mimu_rig::place::EARTH_RATE;
 use mimu_rig::plan::Plan;
-use mimu_rig::rotation::{Vector, dot, norm, scale};
+use mimu_rig::rotation::{dot, norm, scale};
 use mimu_rig::table::{Table, TableTruth};
 
-use super::{assert_near, minus};
+use super::assert_near;
 
 pub fn plan(steps: &str) -> Plan {
     let head = "format = \"mimu-plan/1\"\nsample_rate_hz = 1000.0\ncarrier = \"table\"\nlatitude_deg = 30.5\n\

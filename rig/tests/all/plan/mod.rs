@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use mimu_rig::hands::{Hands, HandsTruth};
 use mimu_rig::located::Source;
-use mimu_rig::plan::{CarriedBy, Plan, Pose, Samples};
+use mimu_rig::plan::{CarriedBy, Plan};
 use mimu_rig::record;
 use mimu_rig::rig_file::{RigFile, RigTruth};
 use mimu_rig::table::{Table, TableTruth};

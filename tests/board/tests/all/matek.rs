@@ -7,7 +7,7 @@ use mimu_board::inertial::{Feed, Sensed};
 use mimu_board::running::Board;
 use mimu_board_tests::conversation::{Answer, Conversation, Sample};
 use mimu_board_tests::{MS, digital_image};
-use mimu_core::wire::{Request, Verdict, flags};
+use mimu_core::wire::{Request, Verdict};
 
 /// The clock on the z axis, g/s, and its first value, g.
 const CLOCK: [f64; 2] = [4.0, -15.5];
@@ -164,10 +164,6 @@ fn every_sample_is_what_the_sensor_sensed_when_the_device_says_that_it_was_taken
         assert_eq!((head.temp_c, head.flags), (temps_c[0], 0));
     }
 }
-
-/// Output register of port C, and the pin of the sensor's chip select, low in a transfer.
-const GPIOC_ODR: u64 = 0x5802_0814;
-const SELECT: u64 = 1 << 15;
 
 #[test]
 #[ignore = "nightly: by day the supply comes back, after which the sensor is set up again"]

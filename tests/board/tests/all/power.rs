@@ -11,7 +11,7 @@ use mimu_core::PerSensor;
 use mimu_core::compensation::{Affine, Compensation};
 use mimu_core::stored::{self, Curves};
 use mimu_core::table::Node;
-use mimu_core::wire::{CHUNK, Call, Decoder, MAX_FRAME, Message, Refusal, Request, encode};
+use mimu_core::wire::{Call, Decoder, MAX_FRAME, Message, Refusal, Request, encode};
 use nalgebra::{Matrix3, Vector3};
 
 /// A calibration with this many temperature nodes, distinct for each `scale`.

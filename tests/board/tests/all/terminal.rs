@@ -4,10 +4,9 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use mimu_board::front::Front;
-use mimu_board::running::{Board, STORE};
 use mimu_board::schematic::Volts;
 use mimu_board::serve::{Pace, Served};
-use mimu_board_tests::{MS, STARTED, image, still};
+use mimu_board_tests::{MS, STARTED, still};
 use mimu_rig::plan::Plan;
 use mimu_rig::rig_file::{RigFile, RigTruth};
 

@@ -1,10 +1,8 @@
 //! Equivalent degrees of freedom against covariances, and intervals against what they claim.
 
 use mimu_allan::bounds::{Estimator, Sampling, interval};
-use mimu_allan::curve::curve;
-use mimu_allan::{Deviation, Spacing};
+use mimu_allan::Deviation;
 
-use super::Random;
 
 const KINDS: [Deviation; 3] = [Deviation::Allan, Deviation::Modified, Deviation::Hadamard];
 

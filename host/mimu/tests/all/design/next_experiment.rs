@@ -5,7 +5,7 @@ use mimu::plan::design::budget::DwellNoise;
 use mimu::plan::design::reach::{Fixture, RateList, Rates};
 use mimu::plan::design::tour::Motion;
 use mimu::plan::next_experiment::prediction::{SEEN, Target};
-use mimu::plan::next_experiment::recipe::{Course, Experiment, Inputs, RECIPES};
+use mimu::plan::next_experiment::recipe::{Experiment, RECIPES};
 use mimu::plan::next_experiment::{Answer, CHAMBER_C, DWELL_S, RATE_DPS, SLEW, Setup, smallest};
 use mimu::quantity::Sensor;
 use mimu_recording::Reference;

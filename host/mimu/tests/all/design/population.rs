@@ -1,7 +1,6 @@
 //! Designs beside the population of a unit's kind, against formulas of this file.
 
 use mimu::plan::design::Problem;
-use mimu::plan::design::fewest::Widths;
 use mimu::plan::design::judgement::Judgement;
 use mimu::plan::design::model::Setting;
 use mimu::plan::design::population::Population;

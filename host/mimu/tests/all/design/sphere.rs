@@ -1,6 +1,5 @@
 //! Attitudes and rates: optima on the sphere.
 
-use std::f64::consts::PI;
 
 use mimu::plan::design::Problem;
 use mimu::plan::design::exchange;
@@ -9,9 +8,8 @@ use mimu::plan::design::model::Setting;
 use mimu::plan::design::reach::Fixture;
 use mimu::plan::design::refinement::Region as _;
 use mimu_recording::Reference;
-use nalgebra::DMatrix;
 
-use super::{accel, brute_force, close, gyro};
+use super::{accel, close, gyro};
 
 #[test]
 fn exchange_finds_what_looking_at_every_design_finds() {
