@@ -166,7 +166,7 @@ fn told(kind: &Kind, seed: u64, clean: &Clean, with: Option<&WithEffect>) -> Str
             out += &objection(what, judged, good);
         }
         if let Some(found) = &with.found {
-            out += &format!("; diagnosis {} {:?}", found.verdict, found.ids);
+            out += &format!("; diagnosis {} {:?}", found.verdict, found.ids());
         }
     }
     out

@@ -114,7 +114,8 @@ fn main() {
         args.remove(0);
     }
     let number = |k: usize, default| args.get(k).and_then(|s| s.parse().ok()).unwrap_or(default);
-    let chosen = |from: usize| -> Vec<&str> { args.iter().skip(from).map(String::as_str).collect() };
+    let chosen =
+        |from: usize| -> Vec<&str> { args.iter().skip(from).map(String::as_str).collect() };
     match study.as_str() {
         "earth" => earth::run(number(0, 100), &chosen(1)),
         "judged" if chosen(0) == ["array"] => judged::array(),
@@ -146,7 +147,11 @@ fn on_table(seeds: u64, clean: u64, chosen: &[&str]) {
     let cases: Vec<(u64, Case)> = cases.collect();
     let (clean, others): (Vec<_>, Vec<_>) = cases.iter().partition(|c| c.1.truth.is_empty());
     let alarms = || clean.iter().filter(|c| c.1.said.verdict != "clean");
-    println!("clean units: {} false alarms of {}", alarms().count(), clean.len());
+    println!(
+        "clean units: {} false alarms of {}",
+        alarms().count(),
+        clean.len()
+    );
     alarms().for_each(|(_, case)| println!("  {case:?}"));
     let listed = || Table::new(&LISTED.map(|c| (c, Figure::Sum)));
     let (mut by_class, mut by_effect) = ([listed(), listed()], listed());

@@ -44,7 +44,11 @@ fn values(p: &Planting) -> [f64; 11] {
         is(Outcome::Refused),
         others as f64,
         p.strength,
-        if named { p.errors[2] / p.errors[1] } else { f64::NAN },
+        if named {
+            p.errors[2] / p.errors[1]
+        } else {
+            f64::NAN
+        },
     ]
 }
 
@@ -67,7 +71,10 @@ pub fn run(seeds: u64, times: f64, chosen: &[&str]) {
     for (ground, [plain, heated]) in grounds.iter().zip(&untouched) {
         let [plain, heated] = [plain, heated].map(|u| (u.said.verdict, u.said.ids().join(", ")));
         let name = &ground.name;
-        println!("| {name} | {} | {} | {}: {} |", plain.0, plain.1, heated.0, heated.1);
+        println!(
+            "| {name} | {} | {} | {}: {} |",
+            plain.0, plain.1, heated.0, heated.1
+        );
     }
     // Each effect in one recording first, then in the next one, so that a run that is ended early has tried all effects.
     let mut jobs = Vec::new();
@@ -129,7 +136,10 @@ fn row(p: &Planting) -> String {
 fn tables(plantings: &[Planting]) {
     let mut columns = COLUMNS.map(|c| (c, Figure::Sum)).to_vec();
     columns.push(("strength, median", Figure::Median));
-    columns.push(("error with effects over affine, median of the named", Figure::Median));
+    columns.push((
+        "error with effects over affine, median of the named",
+        Figure::Median,
+    ));
     for (title, listed) in [("listed effects", true), ("effects on no list", false)] {
         let (mut by_class, mut by_effect) = (Table::new(&columns), Table::new(&columns));
         for planting in plantings.iter().filter(|p| is_listed(p.truth) == listed) {

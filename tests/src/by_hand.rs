@@ -67,7 +67,8 @@ impl Case {
 
     /// Whether exactly the effects of the unit are named.
     pub fn is_named_alone(&self) -> bool {
-        self.said.found.len() == self.truth.len() && self.said.found.iter().all(|f| self.is_right(f))
+        self.said.found.len() == self.truth.len()
+            && self.said.found.iter().all(|f| self.is_right(f))
     }
 
     /// Whether the verdict is correct for the effects of the unit.

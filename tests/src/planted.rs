@@ -432,7 +432,10 @@ impl Ground {
             Sensor::BOTH.map(|s| noncentrality(&diagnosis.before, &reference.before, s).sqrt());
         (planting.sensor, planting.errors, planting.strength) = of_both(errors, strengths);
         let known = untouched.said.ids();
-        planting.said.found.retain(|f| !known.contains(&f[0].as_str()));
+        planting
+            .said
+            .found
+            .retain(|f| !known.contains(&f[0].as_str()));
         Some(planting)
     }
 

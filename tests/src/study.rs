@@ -41,7 +41,10 @@ impl Said {
             reasons.extend(decision.leftover.iter().map(|l| {
                 let usual = if l.usual { " (usual)" } else { "" };
                 let (stratum, against, strength) = (&l.stratum, &l.against, l.strength);
-                format!("{}_{stratum} against {against} {strength:.2e}{usual}", sensor.sensor)
+                format!(
+                    "{}_{stratum} against {against} {strength:.2e}{usual}",
+                    sensor.sensor
+                )
             }));
             let undecided = decision.undecided.iter();
             reasons.extend(undecided.map(|u| format!("{} or {}", u.id, u.law)));
@@ -113,7 +116,11 @@ impl Table {
         let ruler = "---:|".repeat(names.len());
         println!("\n{title}\n\n| | {} |\n|---|{ruler}", names.join(" | "));
         for (name, values) in &self.rows {
-            let cells = self.columns.iter().zip(values).map(|((_, of), v)| figure(*of, v));
+            let cells = self
+                .columns
+                .iter()
+                .zip(values)
+                .map(|((_, of), v)| figure(*of, v));
             println!("| {name} | {} |", cells.collect::<Vec<_>>().join(" | "));
         }
     }

@@ -217,16 +217,6 @@ fn what_one_evaluation_a_sample_leaves_is_far_below_the_noise_of_a_sample() {
     assert_eq!((again - x).norm(), left[0]);
 }
 
-/// Bias that is removed from a triad at rest.
-fn bias<const N: usize>(effects: &Effects<f64, N>, state: &mut State<f64, N>) -> Vector3<f64> {
-    let rest = Sample {
-        gyro: Vector3::zeros(),
-        accel: Vector3::zeros(),
-    };
-    let clean = effects.remove(state, &rest);
-    -clean.gyro - clean.accel
-}
-
 #[test]
 fn what_cannot_be_removed_is_refused() {
     let refused = |id, c: &[f64], form| DeviceEffect::named(id, c, form).unwrap_err();

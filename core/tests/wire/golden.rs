@@ -2,8 +2,8 @@
 
 use mimu_core::PerSensor;
 use mimu_core::wire::{
-    BatchHead, Call, CompensatedBatch, Compatibility, Counts, Decoder, EFFECTS, Frame, MAX_PAYLOAD, Message,
-    RawBatch, Reply, SelfTest, compatibility,
+    BatchHead, Call, Compatibility, CompensatedBatch, Counts, Decoder, EFFECTS, Frame, MAX_PAYLOAD,
+    Message, RawBatch, Reply, SelfTest, compatibility,
 };
 
 fn hex(text: &str) -> Vec<u8> {
@@ -25,7 +25,10 @@ fn told(message: &Message<'_>) -> String {
         Message::Greeting { greeting, .. } => {
             let found = compatibility(greeting);
             let usable = Compatibility::DeviceOlder { usable: true };
-            assert!(found == Compatibility::Same || found == usable, "{found:?} asks for an update");
+            assert!(
+                found == Compatibility::Same || found == usable,
+                "{found:?} asks for an update"
+            );
             format!("{message:?}")
         }
         _ => format!("{message:?}"),
@@ -52,21 +55,33 @@ fn every_message_has_the_bytes_and_the_meaning_of_the_table() {
         let (read, written) = match kind {
             "call" => {
                 let call: Call<'_> = postcard::from_bytes(&bytes).unwrap();
-                (format!("{call:?}"), postcard::to_slice(&call, &mut room).unwrap().to_vec())
+                (
+                    format!("{call:?}"),
+                    postcard::to_slice(&call, &mut room).unwrap().to_vec(),
+                )
             }
             "message" => {
                 let message = Frame(&bytes).message().expect(digits);
-                (told(&message), postcard::to_slice(&message, &mut room).unwrap().to_vec())
+                (
+                    told(&message),
+                    postcard::to_slice(&message, &mut room).unwrap().to_vec(),
+                )
             }
             // Of another version, it may be written otherwise.
-            _ => (told(&Frame(&unframed(&bytes)).message().expect(digits)), bytes.clone()),
+            _ => (
+                told(&Frame(&unframed(&bytes)).message().expect(digits)),
+                bytes.clone(),
+            ),
         };
         if read != expected || written != bytes {
             different.push(format!("{kind} {digits} = {read}"));
         }
     }
     assert!(different.is_empty(), "{}", different.join("\n"));
-    assert_eq!(EFFECTS[18], "gyro_g_squared", "the last bit of the greeting of 3.0");
+    assert_eq!(
+        EFFECTS[18], "gyro_g_squared",
+        "the last bit of the greeting of 3.0"
+    );
 }
 
 /// A compensated batch may end with its samples, and a later version may append; others are whole or none.

@@ -9,8 +9,8 @@ use mimu_core::wire::{Capabilities, KalmanState, Prior, Request};
 use nalgebra::Vector3;
 use serde::Serialize;
 
-use super::received::{Answer, Event};
 use super::line::patience;
+use super::received::{Answer, Event};
 use super::session::{PATIENCE, SILENCE, Session};
 use super::stream::Stream;
 use mimu::quantity::Sensor;

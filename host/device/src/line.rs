@@ -20,7 +20,10 @@ const WAITING: usize = 6000;
 /// Factor of all waits for a device: `MIMU_PATIENCE`, for one behind a slow line or beside a busy computer.
 pub fn patience() -> u32 {
     let factor = std::env::var("MIMU_PATIENCE").ok();
-    factor.and_then(|text| text.parse().ok()).unwrap_or(1).max(1)
+    factor
+        .and_then(|text| text.parse().ok())
+        .unwrap_or(1)
+        .max(1)
 }
 
 /// A port, and what was received on it.

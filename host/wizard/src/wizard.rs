@@ -383,9 +383,9 @@ impl<'a> Wizard<'a> {
             if busy || !self.units.iter().all(wrong) {
                 stood = Instant::now();
             }
-            let out_of_patience =
-                since.elapsed().as_secs_f64() > self.config.patience_s * f64::from(patience())
-                    || stood.elapsed() > WRONG * patience();
+            let out_of_patience = since.elapsed().as_secs_f64()
+                > self.config.patience_s * f64::from(patience())
+                || stood.elapsed() > WRONG * patience();
             if out_of_patience && !self.driver.is_person() {
                 let why = self.units.iter().filter(|u| !u.done);
                 let why = why.filter_map(|u| u.state.waiting.as_ref()).next();

@@ -1,6 +1,5 @@
 //! The sensors over temperature, against curves and branches written out here.
 
-
 use mimu_rig::located::Source;
 use mimu_rig::motion::Motion;
 use mimu_rig::plan::Plan;

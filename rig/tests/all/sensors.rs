@@ -1,6 +1,5 @@
 //! Heat, sensors and converter against closed forms.
 
-
 use mimu_rig::converter::Converter;
 use mimu_rig::filter::LowPass;
 use mimu_rig::located::Source;

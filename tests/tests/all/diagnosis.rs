@@ -42,7 +42,11 @@ fn single_effects_and_a_pair_are_named_and_brought_down_to_the_noise() {
     ];
     for case in sets.iter().flat_map(|ids| cases(ids, 1)) {
         let found: BTreeSet<&str> = case.said.ids().into_iter().collect();
-        assert_eq!(found, case.truth.iter().map(String::as_str).collect(), "{case:?}");
+        assert_eq!(
+            found,
+            case.truth.iter().map(String::as_str).collect(),
+            "{case:?}"
+        );
         assert!(case.after < 1.5, "{case:?}");
     }
 }

@@ -1,5 +1,7 @@
 //! Every kind of judgement, on recordings whose fault is made by the bench or by a driver that errs.
 
+use std::fs;
+use std::path::Path;
 
 use mimu::calibration::Calibration;
 use mimu::calibration::verify::{Causes, Share, Verification, verify};
@@ -30,21 +32,48 @@ fn kind(prepared: Prepared) -> JudgementKind {
 }
 
 /// What a driver makes of the volts of the bench: readings in rad/s and m/s² by the data sheet's 5 mV per deg/s about 2.5 V and 80 mV per m/s² about
-/// 1.65 V, then changed by `fault`, which is given the share of the recording that has passed and the six readings. Time is multiplied by
-/// `time`.
-fn driven(unit: RawUnit, time: f64, fault: impl Fn(f64, &mut [f64])) -> Prepared {
-    driven_on(SEED, unit, time, fault)
+/// 1.65 V, then changed by `fault`, which is given the share of the recording that has passed and the six readings.
+fn driven(fault: impl Fn(f64, &mut [f64])) -> Prepared {
+    driven_on(SEED, fault)
+}
+
+/// Converts the readings of a file to SI by the nulls and sensitivities of the parts, with a fault.
+fn convert(path: &Path, fault: impl Fn(f64, &mut [f64])) {
+    let text = fs::read_to_string(path).expect("samples");
+    let rows = text.lines().count() as f64;
+    let mut lines = text.lines();
+    let head = lines.next().expect("a header");
+    let at = |name: &str| head.split(',').position(|c| c == name).expect("a column");
+    let first = at("gyro_x");
+    assert_eq!(at("accel_z"), first + 5);
+    let mut out = format!("{head}\n");
+    for (row, line) in lines.enumerate() {
+        let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+        let mut six: Vec<f64> = cells[first..first + 6]
+            .iter()
+            .map(|c| c.parse().expect("a reading"))
+            .collect();
+        six[..3]
+            .iter_mut()
+            .for_each(|u| *u = ((*u - 2.5) / 5e-3).to_radians());
+        six[3..].iter_mut().for_each(|u| *u = (*u - 1.65) / 0.08);
+        fault(row as f64 / rows, &mut six);
+        for (cell, value) in cells[first..].iter_mut().zip(six) {
+            *cell = format!("{value:.9}");
+        }
+        out += &(cells.join(",") + "\n");
+    }
+    fs::write(path, out).expect("written");
 }
 
 /// The same on the day `seed`.
-fn driven_on(seed: u64, unit: RawUnit, time: f64, fault: impl Fn(f64, &mut [f64])) -> Prepared {
+fn driven_on(seed: u64, fault: impl Fn(f64, &mut [f64])) -> Prepared {
     let plan = bench::hand_plan(30).replace("carrier", "samples = \"csv\"\ncarrier");
     let folder = bench::written(&plan, &self::unit(), seed);
     let recording = folder.path().join("recording");
-    convert(&recording.join("samples.csv"), time, fault);
+    convert(&recording.join("samples.csv"), fault);
     let mut recording = Recording::open(&recording).expect("a recording");
-    recording.manifest.raw_unit = unit;
-    recording.manifest.sample_rate_hz /= time;
+    recording.manifest.raw_unit = RawUnit::Si;
     Prepared::read(&recording, STILL_FACTOR, |_| ()).expect("readable")
 }
 
@@ -52,15 +81,12 @@ fn driven_on(seed: u64, unit: RawUnit, time: f64, fault: impl Fn(f64, &mut [f64]
 fn a_clean_session_of_thirty_poses_is_good() {
     let prepared = bench::recorded(&bench::hand_plan(30), &unit(), SEED);
     assert_eq!(kind(prepared), JudgementKind::Good);
-    assert_eq!(
-        kind(driven(RawUnit::Si, 1.0, |_, _| ())),
-        JudgementKind::Good
-    );
+    assert_eq!(kind(driven(|_, _| ())), JudgementKind::Good);
 }
 
 #[test]
 fn a_range_that_changes_in_the_middle_is_a_misfit_or_refused() {
-    let changed = driven(RawUnit::Si, 1.0, |passed, six| {
+    let changed = driven(|passed, six| {
         if passed > 0.5 {
             six[3..].iter_mut().for_each(|v| *v *= 0.5);
         }
@@ -79,7 +105,7 @@ fn nothing_held_out_is_untested() {
 
 #[test]
 fn an_error_that_the_model_lacks_is_unexplained_and_a_file_contains_it() {
-    let fit = fitted(driven(RawUnit::Si, 1.0, bent));
+    let fit = fitted(driven(bent));
     let judgement = Judgement::of_fit(&fit);
     assert_eq!(judgement.kind, JudgementKind::Unexplained);
     let file = Calibration::of(&fit, &[], "").expect("a file").to_toml();
@@ -95,11 +121,11 @@ fn bent(_: f64, six: &mut [f64]) {
 /// The misfit widens the intervals of the file, and is as large on the next day.
 #[test]
 fn a_file_whose_own_fit_errs_is_good_on_no_other_day() {
-    let first = fitted(driven(RawUnit::Si, 1.0, bent));
+    let first = fitted(driven(bent));
     let file = Calibration::of(&first, &[], "").expect("a file");
     let own = file.judgement.clone().expect("a judgement");
     for seed in [5, 6] {
-        let later = driven_on(seed, RawUnit::Si, 1.0, bent);
+        let later = driven_on(seed, bent);
         let found = verify(&later, &file).expect("verified");
         assert!(found.judgement.kind >= own.kind, "{}", found.judgement);
         // Also without the word of the file.

@@ -1,6 +1,5 @@
 //! Several sessions of one unit: what they predict, and what is named.
 
-
 use mimu::judgement::{Judgement, JudgementKind};
 use mimu::sessions::Sessions;
 use mimu::sessions::class::PartClass;

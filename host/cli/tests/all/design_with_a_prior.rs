@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
-use super::command::{self, all_refused, says};
+use super::command::{self, all_refused};
 
 /// 0.8 % of 1665 counts per m/s², 4 mrad, 0.2 m/s².
 const SIZES: [f64; 9] = [13.32, 13.32, 13.32, 4e-3, 4e-3, 4e-3, 333.0, 333.0, 333.0];

@@ -13,7 +13,6 @@ use mimu_recording::Recording;
 use mimu_rig::located::Source;
 use mimu_rig::plan::Plan;
 use mimu_rig::rig_file::{RigFile, RigTruth};
-use serde_json::Value;
 
 use super::command::run;
 

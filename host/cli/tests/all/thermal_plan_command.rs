@@ -5,7 +5,7 @@ use std::path::Path;
 use mimu_rig::plan::{Plan, Pose};
 use mimu_rig::table::{Table, TableTruth};
 
-use super::command::{self, Ran, says};
+use super::command::{self, Ran};
 
 fn mimu(folder: &Path, arguments: &str) -> Ran {
     command::mimu(folder, &format!("thermal plan {arguments}"))

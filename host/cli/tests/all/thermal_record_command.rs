@@ -1,17 +1,7 @@
 //! `mimu thermal record` with the firmware's release image on the emulated board, with its table and its chamber.
 #![cfg(unix)]
 
-use std::collections::BTreeMap;
-use std::path::Path;
-use std::process::{Child, Output};
-use std::time::{Duration, Instant};
-
-use mimu_recording::{Manifest, Recording, Reference};
-use mimu_rig::rig_file::RigTruth;
-use serde_json::Value;
-
 use crate::command::mimu;
-use crate::wizard::bench::{Bench, unit};
 
 const PLAN: &str = "format = \"mimu-plan/1\"\nsample_rate_hz = 1000.0\ncarrier = \"table\"\ngravity_mps2 = 9.793\n\
                     chamber_c = [[0.0, 12.0], [85.0, 25.0]]\n[[step]]\nup = [0.0, 0.0, 1.0]\nrate_dps = 60.0\ndwell_s = 2.5\n";

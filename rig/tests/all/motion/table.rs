@@ -1,6 +1,5 @@
 //! Turntables without flaws.
 
-
 use mimu_rig::located::Source;
 use mimu_rig::motion::{Carrier, Instant};
 use mimu_rig::place::EARTH_RATE;

@@ -1,8 +1,7 @@
 //! Equivalent degrees of freedom against covariances, and intervals against what they claim.
 
-use mimu_allan::bounds::{Estimator, Sampling, interval};
 use mimu_allan::Deviation;
-
+use mimu_allan::bounds::{Estimator, Sampling, interval};
 
 const KINDS: [Deviation; 3] = [Deviation::Allan, Deviation::Modified, Deviation::Hadamard];
 

@@ -9,13 +9,9 @@ use mimu_core::compensation::{Affine, Compensation};
 use mimu_core::effects::{DeviceEffect, Variable};
 use mimu_core::stored;
 use mimu_core::table::Node;
-use mimu_core::wire::{
-    BatchHead, Counters, Event as WireEvent, MAX_FRAME, Message, RAW_BYTES, RawBatch, Refusal,
-    Reply, encode,
-};
 use mimu_core::{PerSensor, Sensor};
 
-use mimu_device::{Answer, Event, Received, Receiver, contents};
+use mimu_device::contents;
 use nalgebra::{Matrix3, Vector3};
 
 use crate::random::Random;

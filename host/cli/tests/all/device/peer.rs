@@ -19,7 +19,7 @@ use mimu_core::wire::{
 };
 
 use super::terminal::Terminal;
-use samples::{Calibrated, Running};
+use samples::Calibrated;
 
 pub const GYRO_VOLTS: f32 = 4.2e-5;
 pub const ACCEL_VOLTS: f32 = 2.518e-5;

@@ -1,14 +1,10 @@
 //! The emulated board in a chamber, with a calibration over temperature made from the bench's truth; and trimming its offsets.
 
-use std::fmt::Write as _;
-
-use mimu_rig::located::Source;
-use mimu_rig::rig_file::{RigFile, RigTruth};
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 
 use super::Place;
 use super::board::{AT_REST, Bench, GRAVITY, forward, unit};
-use super::calibration::{Forward, text_of};
+use super::calibration::text_of;
 
 #[test]
 #[ignore = "nightly: half a minute of the emulated board; by day `trim` of mimu-device tests its figures"]

@@ -23,8 +23,8 @@ use mimu_core::compensation::Sample;
 use mimu_core::effects::{Effects, State};
 use nalgebra::Vector3;
 
-use crate::command::{run as command, says};
-use unit::{CUBIC, SAG, THERMAL, fitted, fitted_effect, named, record};
+use crate::command::run as command;
+use unit::{fitted, fitted_effect, record};
 
 /// All named effects, some with only part of their coefficients, and three terms; at ten times data-sheet size.
 fn every_effect() -> Vec<FittedEffect> {

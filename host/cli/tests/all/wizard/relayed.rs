@@ -4,7 +4,7 @@ use std::ffi::OsString;
 use std::path::Path;
 use std::sync::mpsc::{Receiver, Sender, channel};
 
-use mimu::calibration::{Calibration, TriadTable};
+use mimu::calibration::Calibration;
 use mimu_cli::called::{Refusal, Session, wizard};
 use mimu_recording::{ClockRate, Manifest, Times};
 use mimu_wizard::event::{Event, Question, SessionState, UserRequest, View};
@@ -14,7 +14,7 @@ use mimu_wizard::session::Outcome;
 use mimu_wizard::turn::go_on;
 
 use super::text::{judge, lines, lines_in};
-use crate::command::{done, mimu, says};
+use crate::command::{done, says};
 
 /// Relays events, and ends the session on request.
 struct Told {

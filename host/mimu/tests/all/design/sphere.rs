@@ -1,6 +1,5 @@
 //! Attitudes and rates: optima on the sphere.
 
-
 use mimu::plan::design::Problem;
 use mimu::plan::design::exchange;
 use mimu::plan::design::information::Inverse;

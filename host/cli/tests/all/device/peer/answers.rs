@@ -2,15 +2,12 @@
 
 use std::time::Instant;
 
-use mimu_core::kalman::Bank;
 use mimu_core::stored::{self, MAX_LENGTH, ROOM};
 use mimu_core::wire::{
-    Call, Capabilities, Counters, Greeting, KalmanAxis, KalmanState, Message, Prior, Refusal,
-    Reply, Request, Slot, StoredInfo, TestRow, TestTable, Verdict,
+    Call, Capabilities, Counters, Greeting, Message, Refusal, Reply, Request, Slot, StoredInfo,
+    TestRow, TestTable, Verdict,
 };
-use nalgebra::Vector3;
 
-use super::samples::Running;
 use super::{Device, UNIT_ID};
 
 impl Device {

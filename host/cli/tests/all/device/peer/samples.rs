@@ -4,13 +4,10 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use mimu_core::effects;
-use mimu_core::kalman::Bank;
 use mimu_core::stored::{self, ROOM, Stored};
 use mimu_core::wire::{
-    BATCH, BatchHead, CompensatedBatch, Counts, Event, KalmanState, Message, RawBatch, flags,
-    reading,
+    BATCH, BatchHead, CompensatedBatch, Counts, Event, Message, RawBatch, flags, reading,
 };
-use nalgebra::Vector3;
 
 use super::{Act, Device, TEMP_C, sums};
 
