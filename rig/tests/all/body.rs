@@ -4,7 +4,7 @@ use std::fs;
 
 use mimu_rig::field::{FieldTruth, MagnetTruth};
 use mimu_rig::located::Source;
-use mimu_rig::plan::{Plan, Samples};
+use mimu_rig::plan::Plan;
 use mimu_rig::record::{Output, Row, samples, write};
 use mimu_rig::rig_file::{RigFile, RigTruth};
 use mimu_rig::rotation::{Vector, add, norm, scale};
@@ -108,44 +108,6 @@ fn a_dipole_has_twice_the_field_along_its_axis_as_across_and_falls_with_the_cube
     assert_near(field.at([0.7, 0.0, 0.0], 4.0), [0.0, 0.0, -25.0], 1e-9);
     for t_s in [2.9, 5.0] {
         assert_near(field.at([0.5, 0.0, 0.2], t_s), [0.0; 3], 0.0);
-    }
-}
-
-/// Two further triads: one that samples in every fourth row, and one that repeats its samples.
-fn slow() -> String {
-    let mag = pure("mag", "every = 4");
-    let gyro = pure("gyro12", "every = 4\nbetween = \"repeat\"");
-    format!("{mag}{gyro}")
-}
-
-#[test]
-fn a_slower_triad_leaves_cells_empty_or_repeats_its_last_sample() {
-    let (plan, truth) = (hands(100.0, 3), truth(&slow(), 2));
-    let rows: Vec<Row> = samples(&plan, &truth, 2).unwrap().collect();
-    for (k, row) in rows.iter().enumerate() {
-        let [mag, gyro] = [row.further[0], row.further[1]];
-        assert!(mag.iter().all(|x| x.is_nan() == (k % 4 > 0)), "{k} {mag:?}");
-        assert_near(gyro, rows[k - k % 4].instant.motion.rate, 1e-12);
-    }
-    let folder = tempfile::tempdir().unwrap();
-    let mut output = Output::new(&folder.path().join("rec"), &plan).unwrap();
-    output.samples = Samples::Csv;
-    write(&plan, &truth, 2, &output).unwrap();
-    let text = fs::read_to_string(folder.path().join("rec/samples.csv")).unwrap();
-    let mut lines = text.lines();
-    let head = lines.next().unwrap();
-    let columns = "accel_z,mag_x,mag_y,mag_z,gyro12_x,gyro12_y,gyro12_z";
-    assert!(head.ends_with(columns), "{head}");
-    for (line, row) in lines.zip(&rows) {
-        let cells: Vec<&str> = line.split(',').collect();
-        assert_eq!(cells.len(), head.split(',').count(), "{line}");
-        let numbers = row.readings.accel.into_iter().chain(row.further.concat());
-        for (cell, number) in cells[cells.len() - 9..].iter().zip(numbers) {
-            match number.is_nan() {
-                true => assert_eq!(*cell, ""),
-                false => assert_eq!(cell.parse::<f64>().unwrap(), number),
-            }
-        }
     }
 }
 

@@ -2,8 +2,6 @@
 
 use mimu_rig::located::Source;
 use mimu_rig::motion::Motion;
-use mimu_rig::plan::Plan;
-use mimu_rig::record;
 use mimu_rig::rig_file::{RigFile, RigTruth};
 use mimu_rig::rotation::Rotation;
 use mimu_rig::unit::Unit;
@@ -146,34 +144,6 @@ fn hysteresis_goes_by_the_path_of_the_temperature_and_not_by_its_rate() {
             near(gyro[1], -60.0 * DEG_PER_H * expected, 1e-12);
             near(gyro[2], 0.0, 1e-15);
         }
-    }
-}
-
-#[test]
-fn a_thermometer_that_sticks_or_jumps_leaves_everything_else_as_it_was() {
-    let plan = "format = \"mimu-plan/1\"\nsample_rate_hz = 10\ncarrier = \"table\"\nchamber_c = [[0, 0], [100, 50]]\n\
-                [[step]]\nup = [0, 0, 1]\ndwell_s = 100\n";
-    let plan = Plan::parse(Source::new("PLAN.toml", plan)).unwrap();
-    let run = |flaws: &str| {
-        let rows = record::samples(&plan, &truth(flaws, 3), 3).unwrap();
-        rows.collect::<Vec<_>>()
-    };
-    let good = run("");
-    let bad = run(
-        "[flaws]\nthermometer_sticks_s = [20, 30]\nthermometer_jumps_s = 60\nthermometer_jump_c = -3",
-    );
-    assert_eq!(good.len(), bad.len());
-    for (good, bad) in good.iter().zip(&bad) {
-        let t = good.stamp_s;
-        // The chamber rises by half a kelvin a second, and the plain unit follows within hundredths.
-        let expected = match t {
-            t if (20.0..30.0).contains(&t) => 0.5 * 20.0,
-            t if t >= 60.0 => 0.5 * t - 3.0,
-            t => 0.5 * t,
-        };
-        near(bad.readings.temp_c, expected, 0.02);
-        assert_eq!(bad.readings.gyro, good.readings.gyro);
-        assert_eq!(bad.readings.accel, good.readings.accel);
     }
 }
 

@@ -225,39 +225,6 @@ fn the_row_in_which_the_accelerometers_range_changes_is_named_and_neither_part_i
 }
 
 #[test]
-fn the_row_in_which_columns_change_places_is_named_and_the_part_before_it_is_a_session() {
-    let samples = Log::new(9).session(36);
-    // In the order of the file: accelerometer, gyro. Two bytes are lost, so each column holds its neighbour from there on.
-    let order = [3, 4, 5, 0, 1, 2];
-    let row = 7310;
-    let mut shifted = samples.clone();
-    for (k, c) in order.into_iter().enumerate() {
-        let from = &samples.raw[order[(k + 1) % 6]];
-        shifted.raw[c][row..].copy_from_slice(&from[row..]);
-    }
-    let prepared = by_hand(&shifted).unwrap();
-    let fault = prepared.dwells.fault.expect("a fault");
-    assert_eq!(
-        (fault.rows.first, fault.fault),
-        (
-            Some(row as u64 + 1),
-            Fault::ColumnsMoved {
-                now: "accel_z",
-                before: "gyro_x"
-            }
-        )
-    );
-    let before = prepared.dwells.list.iter();
-    let before = before.filter(|d| (d.first_row as usize) < row).count();
-    let problems = RecordingProblem::without_fit(&prepared);
-    assert!(problems.iter().any(|p| p.id() == "columns_moved"));
-    assert!(fit(prepared, Options::default()).is_err());
-    let part = by_hand(&first_rows(&samples, row)).unwrap();
-    assert_eq!(used(&part), before);
-    assert!(fit(part, Options::default()).is_ok());
-}
-
-#[test]
 fn sessions_without_a_fault_of_the_log_have_none() {
     for seed in 20..30 {
         let prepared = by_hand(&Log::new(seed).session(25)).unwrap();

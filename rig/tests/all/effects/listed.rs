@@ -201,38 +201,6 @@ fn thermal_errors_follow_the_temperature_of_the_dies() {
 }
 
 #[test]
-fn a_thermal_lag_opens_a_loop_as_wide_as_the_ramp_and_closes_at_rest() {
-    let ramp = 0.05;
-    for (id, key, unit) in [
-        ("gyro_thermal_lag", "dps_per_c", DPS),
-        ("accel_thermal_lag", "mg_per_c", MG),
-    ] {
-        for sign in [1.0, -1.0] {
-            let effect = format!("id = \"{id}\"\n{key} = [1, 2, 3]\nlag_s = 30");
-            let (mut pair, dt) = (Pair::new(&effect, 0.1), 0.1);
-            let mut error = [0.0; 3];
-            for n in 0..6000 {
-                let (gyro, accel) = pair.step(
-                    &motion(0.0, [0.0; 3], [0.0; 3]),
-                    25.0 + sign * ramp * dt * f64::from(n),
-                );
-                error = if id.starts_with("gyro") { gyro } else { accel };
-                if n == 0 {
-                    close(error, [0.0; 3], 0.0, "at rest");
-                }
-            }
-            // 600 s are 20 lags.
-            close(
-                error,
-                [1.0, 2.0, 3.0].map(|c| -sign * c * unit * ramp * 30.0),
-                1e-6 * unit,
-                id,
-            );
-        }
-    }
-}
-
-#[test]
 fn a_mismatched_bit_adds_its_error_wherever_it_is_set() {
     let rig = "format = \"mimu-rig/1\"\n[unit.gyro_axes]\nwhite_si = [0, 0, 0]\ninstability_si = [0, 0, 0]\n\
                walk_si = [0, 0, 0]\nbandwidth_hz = [inf, inf, inf]\n[converter]\nreference_error_ppm = 0\n";

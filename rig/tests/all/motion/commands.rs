@@ -3,11 +3,11 @@
 use mimu_rig::command::{Command, Commanded};
 use mimu_rig::hands::{Hands, HandsTruth};
 use mimu_rig::motion::{Carrier, Motion};
-use mimu_rig::plan::{Plan, TableAxis, Turn};
+use mimu_rig::plan::Plan;
 use mimu_rig::rotation::{Vector, norm, scale};
 use mimu_rig::table::{Table, TableTruth};
 
-use super::table::{plan, table};
+use super::table::plan;
 use super::{assert_near, minus};
 
 const H: f64 = 1e-3;
@@ -96,37 +96,6 @@ impl<'a> Course<'a> {
             );
         }
     }
-}
-
-#[test]
-fn a_turn_by_an_angle_is_that_of_a_plan_and_begins_at_rest() {
-    let truth = TableTruth::default();
-    let steps = "lead_in_s = 1\n[[step]]\nup = [0, 0, 1]\ndwell_s = 1\n[[step]]\nturn_axis = \"middle\"\nturn_deg = 90\nturn_dps = 30";
-    let mut planned = table(steps, &truth);
-    let mut told = Table::commanded(&plan(steps), &truth).unwrap();
-    let mut course = Course::new(&mut told);
-    course.run(2.0);
-    let turn = Turn {
-        axis: TableAxis::Middle,
-        angle: 90f64.to_radians(),
-        rate: 30f64.to_radians(),
-    };
-    course.tell(Command::Turn(turn));
-    for _ in 0..3000 {
-        let motion = course.step();
-        let other = planned.at(motion.t_s).motion;
-        assert_near(motion.rate, other.rate, 1e-9);
-    }
-    course.wait();
-    assert_near(
-        course.carrier.position(course.t_s()).up,
-        [0.0, 1.0, 0.0],
-        1e-12,
-    );
-    course.tell(Command::Rate(0.5));
-    let t_s = course.t_s();
-    let refused = course.carrier.command(t_s, Command::Turn(turn));
-    assert!(refused.unwrap_err().contains("starts from rest"));
 }
 
 #[test]
@@ -255,34 +224,6 @@ const FACES: [Vector; 6] = [
     [0.0, -1.0, 0.0],
     [0.0, 0.0, 1.0],
 ];
-
-#[test]
-fn no_command_makes_a_hand_jump_whenever_it_comes() {
-    let truth = HandsTruth {
-        // Long and large knocks, so that some commands coincide with one.
-        jolt_probability: 1.0,
-        jolt_s: 1.0,
-        jolt_mrad: 30.0,
-        ..HandsTruth::default()
-    };
-    for seed in 0..4 {
-        let mut told = hand(&truth, seed);
-        let mut course = Course::new(&mut told);
-        course.tell(Command::Fidget(1));
-        for (k, up) in FACES.iter().cycle().take(40).enumerate() {
-            course.tell(go(*up));
-            if k % 5 == 0 {
-                course.tell(Command::Hold(k % 2 == 0));
-            }
-            course.run(0.1 + 0.173 * ((k * k) % 37) as f64);
-            if k % 7 == 0 {
-                course.tell(Command::Stop);
-            }
-        }
-        // A turn of 180 degrees within a second has 18 rad/s², and its detour as much.
-        course.is_continuous(60.0);
-    }
-}
 
 #[test]
 fn a_hand_that_moves_in_every_third_pose_does_so_after_it_has_come_to_rest_and_in_no_other() {

@@ -6,8 +6,7 @@ use std::path::{Path, PathBuf};
 use mimu_rig::hands::{Hands, HandsTruth};
 use mimu_rig::located::Source;
 use mimu_rig::plan::{CarriedBy, Plan};
-use mimu_rig::record;
-use mimu_rig::rig_file::{RigFile, RigTruth};
+use mimu_rig::rig_file::RigFile;
 use mimu_rig::table::{Table, TableTruth};
 
 mod mistakes;
@@ -65,34 +64,6 @@ fn what_the_table_cannot_do_is_refused_with_its_limit_and_the_line_of_the_plan()
     // The limits themselves are allowed.
     let edge = "up = [0, 0.99619469809, -0.08715574274]\nspin_dps = 400\ndwell_s = 1";
     Table::new(&parse(&format!("{HEAD}[[step]]\n{edge}\n")).unwrap(), &two).unwrap();
-}
-
-#[test]
-fn a_plan_that_takes_too_long_with_its_moves_or_samples_is_refused_before_it_begins() {
-    let truth = |text: &str| {
-        let source = Source::new("RIG.toml", format!("format = \"mimu-rig/1\"\n{text}"));
-        RigTruth::resolve(&RigFile::parse(&source).unwrap(), 1).unwrap()
-    };
-    let plan = parse(&format!("{HEAD}[[step]]\nposes = 90000\ndwell_s = 1\n")).unwrap();
-    let error = record::samples(&plan, &truth("[table]\nsettle_s = 60"), 1)
-        .err()
-        .unwrap();
-    assert!(
-        error.starts_with(
-            "PLAN.toml:5: with the moves from pose to pose the plan has 90000 dwells, "
-        ),
-        "{error}"
-    );
-    assert_complaint(
-        &format!(
-            "{}[[step]]\nposes = 1\ndwell_s = 172800\n",
-            HEAD.replace("1000.0", "20000")
-        ),
-        (
-            "PLAN.toml:5: up to this entry the plan has 1 dwells, 48.0 h, 3.456e9 samples",
-            "2e8 samples",
-        ),
-    );
 }
 
 #[test]

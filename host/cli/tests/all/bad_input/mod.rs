@@ -6,9 +6,9 @@
 use std::f64::consts::PI;
 
 mod answer;
-mod damage;
+pub mod damage;
 mod files;
-mod generator;
+pub mod generator;
 mod left_out;
 mod listed;
 mod refused;

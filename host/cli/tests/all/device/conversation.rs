@@ -169,22 +169,6 @@ fn a_self_test_names_what_failed_and_what_the_pose_did_not_show() {
 }
 
 #[test]
-fn when_the_power_came_is_told_or_that_it_is_not_known() {
-    let place = Place::new();
-    let told = |powered_for_ms| {
-        let peer = Peer::new(Script {
-            powered_for_ms,
-            ..Script::default()
-        });
-        mimu(&place, &["device", "info", "--port", &peer.path]).stdout
-    };
-    let known = told(Some(90_500));
-    assert!(known.contains("90.5 s before sampling began"), "{known}");
-    let lost = told(None);
-    assert!(lost.contains("power-on      unknown"), "{lost}");
-}
-
-#[test]
 fn samples_that_carry_a_flag_are_counted_and_told() {
     let place = Place::new();
     let script = || Script {

@@ -2,7 +2,7 @@
 
 use std::os::unix::process::CommandExt as _;
 
-use mimu_core::wire::{PROTOCOL, Version, WrongRegister};
+use mimu_core::wire::{PROTOCOL, Version};
 
 use super::peer::{Behaviour, Peer, Script};
 use super::terminal::Terminal;
@@ -72,23 +72,6 @@ fn an_older_a_newer_and_a_foreign_device_are_told_apart() {
         ..Script::default()
     };
     info(foreign, &[]).refused(&["wrong firmware", "nimu"]);
-}
-
-#[test]
-fn a_sensor_that_is_missing_is_named_with_what_it_reads() {
-    let script = Script {
-        wrong_register: Some(WrongRegister {
-            register: 0x75,
-            identifies: true,
-            found: 0,
-            expected: 0x47,
-        }),
-        ..Script::default()
-    };
-    let told = info(script, &["--json", "-"]).json();
-    let warning = told["warnings"][0].as_str().unwrap();
-    says(warning, &["WHO_AM_I reads 0x00, and 0x47 was expected"]);
-    assert_eq!(told["wrong_register"]["found"], 0);
 }
 
 #[test]

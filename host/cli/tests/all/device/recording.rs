@@ -101,43 +101,6 @@ fn lost_and_garbled_batches_are_gaps_that_are_counted_and_never_closed() {
     assert!(!recording.manifest.unfinished);
 }
 
-#[test]
-fn dwells_by_time_begin_and_end_with_their_sample_and_parquet_holds_the_same() {
-    let place = Place::new();
-    let peer = Peer::new(Script {
-        speed: 4.0,
-        ..Script::default()
-    });
-    let fixed = [
-        "record", "--port", &peer.path, "-o", "rec", "--for", "3s", "--json", "-",
-    ];
-    #[rustfmt::skip]
-    let more = ["--step-every", "700ms,300ms", "--format", "parquet", "--gravity", "9.81"];
-    let result = mimu(&place, &[&fixed[..], &more].concat()).json();
-    assert_eq!(result["dwells"], 3);
-    assert!(place.path("rec/samples.parquet").exists());
-    assert!(!place.path("rec/samples.csv").exists());
-    let (recording, rows) = rows(&place, "rec");
-    assert_eq!(recording.manifest.gravity_mps2, 9.81);
-    check_rows(&rows);
-    let expected = |k: usize| {
-        if k % 1000 < 700 {
-            (k / 1000) as i32
-        } else {
-            -1
-        }
-    };
-    let steps: Vec<i32> = (0..3000).map(expected).collect();
-    assert_eq!(rows.step, steps);
-    // The recording exists already, and is kept.
-    let before = std::fs::read(place.path("rec/samples.parquet")).unwrap();
-    mimu(&place, &fixed).refused(&["rec", "exists already"]);
-    assert_eq!(
-        std::fs::read(place.path("rec/samples.parquet")).unwrap(),
-        before
-    );
-}
-
 /// Waits until the recording `rec` has so many bytes of samples. Returns how many it has.
 fn wait_for(place: &Place, bytes: u64) -> u64 {
     let until = Instant::now() + Duration::from_secs(600);
@@ -391,32 +354,4 @@ fn a_plan_by_time_gives_every_sample_of_a_dwell_its_input() {
         }
     }
     assert_eq!(row, 1750);
-}
-
-#[test]
-fn a_table_of_inputs_is_taken_by_the_labels_of_its_rows_and_turns_at_the_end() {
-    let place = Place::new();
-    let inputs = "step,turn_x_deg,ref_force_z_mps2\nface_up,,9.81\nabout_x,90,\nface_down,,-9.81\n";
-    std::fs::write(place.path("inputs.csv"), inputs).unwrap();
-    let peer = Peer::new(Script {
-        speed: 4.0,
-        ..Script::default()
-    });
-    #[rustfmt::skip]
-    let arguments = [
-        "record", "--port", &peer.path, "-o", "rec", "--inputs", "inputs.csv", "--step-every", "500ms,100ms", "--for", "1100ms", "--gravity",
-        "9.81", "--json", "-",
-    ];
-    let result = mimu(&place, &arguments).json();
-    // Of the last one nothing was recorded, which is reported.
-    let warning = result["warnings"][0].as_str().unwrap();
-    assert!(warning.contains("face_down"), "{warning}");
-    let (recording, rows) = rows(&place, "rec");
-    let manifest = &recording.manifest;
-    assert_eq!(manifest.step_labels, ["face_up", "about_x", "face_down"]);
-    assert_eq!(manifest.turn_steps, [1]);
-    assert_eq!(rows.reference[5][10], 9.81);
-    assert!(rows.reference[0][10].is_nan() && rows.reference[5][550].is_nan());
-    // 90 degrees in half a second.
-    assert_eq!((rows.step[700], rows.reference[0][700]), (1, 180.0));
 }
