@@ -28,7 +28,7 @@ fn cases(ids: &[&str], seeds: u64) -> Vec<Case> {
 #[test]
 fn clean_units_are_told_to_be_clean() {
     // `make blind` allows two of its 200 units not to be clean.
-    for case in cases(&[], 2) {
+    for case in cases(&[], 1) {
         assert_eq!(case.said.verdict, "clean", "{case:?}");
     }
 }

@@ -42,15 +42,13 @@ fn six_poses_with_the_prior_determine_scale_factors_and_biases() {
 fn few_poses_of_a_stranger_are_not_believed_to_be_of_the_population() {
     let prior = prior(40);
     for of in [[0, 0], [0, 9], [1, 0], [1, 9]] {
-        for poses in [6, 9] {
-            let (_, _, given_up) = study(20_000..20_006, poses, Some(&prior), (of, 8.0));
-            println!("{of:?}, {poses} poses: {given_up} of 6");
-            assert!(given_up >= 5, "{of:?}, {poses} poses: {given_up} of 6");
-        }
+        let (_, _, given_up) = study(20_000..20_006, 6, Some(&prior), (of, 8.0));
+        assert!(given_up >= 5, "{of:?}, six poses: {given_up} of 6");
     }
 }
 
 #[test]
+#[ignore = "nightly: 72 units"]
 fn turns_between_poses_show_angles_that_are_not_of_the_population() {
     let prior = prior(40);
     // Five turns between six poses show such an angle in one of five units: the angles of the gyro explain them as well.

@@ -113,29 +113,6 @@ fn a_miscounted_turn_is_named_and_does_no_harm() {
     assert!((0..3).all(|k| scales.errors[k].abs() < 1e-3), "{scales:?}");
 }
 
-/// Whoever stops half-way rests there, and the next turn begins where this one stopped.
-#[test]
-fn a_rest_within_a_turn_does_no_harm() {
-    let file = unit(&[], Grade::Consumer, 3);
-    let about = "\nabout = [0.0, 0.0, 1.0]\ndwell_s = 2.0\n";
-    let plan = Session::POSES_AND_TURNS.plan();
-    let whole = format!("[[step]]\nwhole_turns = 10{about}");
-    assert!(plan.contains(&whole), "{plan}");
-    let parts = ["4.6", "5.4"].map(|turns| format!("[[step]]\nwhole_turns = {turns}{about}"));
-    let plan = plan.replace(&whole, &parts.concat());
-    let stated = Some(WholeTurns::default());
-    let fitted = fit(recorded(&file, &plan, 3, stated), Options::IN_SAMPLE).unwrap();
-    let told: Vec<String> = fitted.all_warnings().map(ToString::to_string).collect();
-    assert!(
-        !told.iter().any(|w| w.contains("from where they began")),
-        "{told:?}"
-    );
-    let scales = scales(&fitted, &file, 3, &plan);
-    for (error, half) in scales.errors.iter().zip(scales.half_widths) {
-        assert!(error.abs() < 2.0 * half && half < 3e-4, "{error} {half}");
-    }
-}
-
 #[test]
 fn a_unit_that_is_not_put_back_is_named_and_left_out() {
     let file = unit(&[], Grade::Consumer, 4);

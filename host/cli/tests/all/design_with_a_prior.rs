@@ -56,51 +56,6 @@ fn json(folder: &Path, arguments: &str) -> serde_json::Value {
 }
 
 #[test]
-fn six_poses_are_designed_beside_the_population_alone() {
-    let folder = folder();
-    let design = json(folder.path(), "--prior kind.toml -n 6 --sigma 0.0015");
-    assert_eq!(design["positions"].as_array().unwrap().len(), 6);
-    assert_eq!(
-        (&design["reference"], &design["table"]),
-        (&"gravity".into(), &"hand".into())
-    );
-    assert_eq!(design["prior"]["units"], 60);
-    // The optimum depends on the number of dwells.
-    assert!(design["d_efficiency"].is_null() && design["determinant"].is_null());
-    let known = [
-        ("C_yy", 1.96 * 0.008),
-        ("C_zx", 1.96 * 4e-3),
-        ("o_z", 1.96 * 0.2),
-    ];
-    for (name, half) in known {
-        let all = design["sigma_per_parameter"].as_array().unwrap();
-        let found = all.iter().find(|p| p["name"] == name).unwrap();
-        let alone = found["population_half_width_95"].as_f64().unwrap();
-        assert!((alone / half - 1.0).abs() < 1e-4, "{name}: {alone}");
-        // Six faces leave the angles to the population.
-        let share = found["half_width_95"].as_f64().unwrap() / alone;
-        assert!(
-            share <= 1.0 && (share < 0.1 || name == "C_zx"),
-            "{name}: {share}"
-        );
-    }
-    // Nine dwells at least without a prior.
-    assert!(design["prior"]["dwells_without"].as_u64().unwrap() >= 9);
-    let by = design["prior"]["by_dwells"].as_array().unwrap();
-    let six = by.iter().find(|b| b["dwells"] == 6).unwrap();
-    assert!(six["without"].is_null() && six["with"]["scale"].is_number());
-    assert!(by.iter().find(|b| b["dwells"] == 9).unwrap()["without"]["scale"].is_number());
-    // Without a prior nothing has changed.
-    let without = json(folder.path(), "-n 12 --table hand");
-    assert!(without["d_efficiency"].is_number() && without.get("prior").is_none());
-    assert!(
-        without["sigma_per_parameter"][0]
-            .get("population_half_width_95")
-            .is_none()
-    );
-}
-
-#[test]
 fn without_a_number_the_plan_has_the_fewest_dwells_for_the_targets() {
     let folder = folder();
     let of = |arguments: &str| {

@@ -2,7 +2,7 @@
 
 use mimu_rig::command::{Command, Commanded};
 use mimu_rig::hands::{Hands, HandsTruth};
-use mimu_rig::motion::{Carrier, Motion};
+use mimu_rig::motion::Motion;
 use mimu_rig::plan::Plan;
 use mimu_rig::rotation::{Vector, norm, scale};
 use mimu_rig::table::{Table, TableTruth};

@@ -6,7 +6,7 @@
 use std::f64::consts::PI;
 
 mod answer;
-pub mod damage;
+mod damage;
 mod files;
 pub mod generator;
 mod left_out;
@@ -23,40 +23,11 @@ fn what_only_its_owner_can_judge_is_a_warning() {
     let cases: &[Case] = &[
         ("two axes of the gyro swapped", by_hand, |s| swap(s, "gyro_x", "gyro_y"), &["gyro: the axes are left-handed"]),
         ("two axes of the accelerometer swapped", by_hand, |s| swap(s, "accel_x", "accel_y"), &["gyro: its axes are rotated by 180 degrees"]),
-        (
-            "all axes of the gyro in another order",
-            on_table,
-            |s| {
-                swap(s, "gyro_x", "gyro_y");
-                swap(s, "gyro_y", "gyro_z");
-            },
-            &["gyro: its axes are rotated by 121 degrees relative to those of the ref_ columns"],
-        ),
-        (
-            "degrees for radians",
-            by_hand,
-            |s| {
-                s.set("raw_unit", "\"SI\"");
-                scale(s, "accel", 1.0 / 1640.0);
-                scale(s, "gyro", 180.0 / PI / 5000.0);
-            },
-            &["gyro: raw_unit = \"SI\"", "they are in deg/s"],
-        ),
+        ("all axes of the gyro in another order", on_table, |s| { swap(s, "gyro_x", "gyro_y"); swap(s, "gyro_y", "gyro_z") }, &["gyro: its axes are rotated by 121 degrees relative to those of the ref_ columns"]),
+        ("degrees for radians", by_hand, |s| { s.in_si(); scale(s, "gyro", 180.0 / PI) }, &["gyro: raw_unit = \"SI\"", "they are in deg/s"]),
         ("counts for SI", by_hand, |s| s.set("raw_unit", "\"SI\""), &["accel: raw_unit = \"SI\"", "1632 times"]),
-        (
-            "the first rows at the full scale of a gyro in SI",
-            by_hand,
-            |s| {
-                s.set("raw_unit", "\"SI\"");
-                scale(s, "accel", 1.0 / 1640.0);
-                scale(s, "gyro", 1.0 / 5000.0);
-                // As an import with a factor of six digits writes 250 deg/s.
-                for column in ["gyro_x", "gyro_y", "gyro_z"] {
-                    s.edit(column, 0..1, |_| 250.0 * 0.0174533);
-                }
-            },
-            &["gyro_y: 1 sample at 4.363325", "full scale"],
-        ),
+        // As an import with a factor of six digits writes 250 deg/s.
+        ("the first rows at the full scale of a gyro in SI", by_hand, |s| { s.in_si(); s.rows[0][1..4].fill(250.0 * 0.0174533) }, &["gyro_y: 1 sample at 4.363325", "full scale"]),
         ("nothing but poses on the table", || on_table_at(&[0.0], &[0, 1, 2]), |_| {}, &["gyro: not calibrated: all dwells have the same input"]),
     ];
     for (name, base, damage, words) in cases {

@@ -31,7 +31,6 @@ use mimu_recording::{
     ColumnList, ImportOptions, LogOptions, RawUnit, Recording, Reference, SampleFormat, import,
 };
 
-use crate::bad_input::damage::keep_every;
 use crate::bad_input::generator::{by_hand_at, on_table_at};
 use mutation::*;
 
@@ -71,7 +70,7 @@ fn samples(table: bool) -> String {
     for (row, cells) in samples.rows.iter_mut().enumerate() {
         cells.insert(2, 25.0 + 0.1 * (row % 10) as f64);
     }
-    keep_every(&mut samples, 5, 0);
+    samples.keep_every(5, 0);
     samples.csv()
 }
 
