@@ -123,6 +123,8 @@ pub struct Script {
     pub wrong_register: Option<WrongRegister>,
     /// Flags of all its batches.
     pub flags: u16,
+    /// The next batch is not sent; then it is no more set.
+    pub lose: Arc<AtomicBool>,
 }
 
 impl Default for Script {
@@ -152,6 +154,7 @@ impl Default for Script {
             powered_for_ms: Some(0),
             wrong_register: None,
             flags: 0,
+            lose: Arc::default(),
             start: Start::Panic {
                 file: "src/x.rs",
                 line: 7,

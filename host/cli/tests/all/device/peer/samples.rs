@@ -32,6 +32,7 @@ impl Device {
                     self.script.acts.remove(0);
                     Some(act)
                 }
+                _ if self.script.lose.swap(false, Ordering::Relaxed) => Some(Act::Drop),
                 _ => None,
             };
             match act {
