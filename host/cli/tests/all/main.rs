@@ -22,6 +22,5 @@ mod over_temperature;
 mod pocket_calculator;
 mod random;
 mod readme;
-mod thermal_command;
 mod thermal_plan_command;
 mod wizard;
