@@ -2,7 +2,7 @@
 -- Labels are like line=B/batch=2026-10/unit-00007.
 
 create or replace view results as
-select *, regexp_extract(label, 'line=([^/]*)', 1) as line, regexp_extract(label, 'batch=([^/]*)', 1) as batch from read_parquet('results/*.parquet');
+select *, regexp_extract(label, 'line=([^/]*)', 1) as line, regexp_extract(label, 'batch=([^/]*)', 1) as batch from read_parquet('results/*.parquet', union_by_name = true);
 
 -- Worst held-out error by batch.
 select line, batch, count(*) as units, round(degrees(max(gyro_held_out)), 4) as gyro_worst_deg, arg_max(device, gyro_held_out) as gyro_worst,

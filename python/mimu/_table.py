@@ -267,8 +267,8 @@ def _opened(label: str, path: str | None, of_paths: bool, keywords: dict[str, An
             try:
                 yield read(copy, **keywords)
             except Error as error:
-                parts = (text.replace(copy, path) for text in (error.place, error.problem, error.remedy))
-                raise Error.of(*parts, kind=error.kind) from None
+                place, problem, remedy = (text.replace(copy, path) for text in (error.place, error.problem, error.remedy))
+                raise Error.of(place, problem, remedy, error.kind) from None
 
 
 def _found(data: Mapping[str, Any]) -> dict[str, Any]:

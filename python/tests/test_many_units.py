@@ -19,10 +19,11 @@ import duckdb
 import fsspec
 import mimu
 import numpy as np
+import production_line
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from conftest import EXAMPLES, ROOT, example, json_of, run
+from conftest import EXAMPLES, ROOT, json_of, run
 from mimu import _mimu
 
 UNITS = 12
@@ -58,7 +59,7 @@ def found(parts: Path) -> pa.Table:
 
 def without_times(table: pa.Table) -> pa.Table:
     """Without processor time and the moment of each fit."""
-    text = [value and "\n".join(line for line in value.splitlines() if not line.startswith("created")) for value in table["calibration"].to_pylist()]
+    text = [value and "\n".join(line for line in value.splitlines() if not production_line.startswith("created")) for value in table["calibration"].to_pylist()]
     return table.drop_columns(["seconds", "processor_s", "calibration"]).append_column("calibration", pa.array(text, pa.string()))
 
 
@@ -276,23 +277,22 @@ def test_a_fleet_reads_the_parts_as_it_reads_calibration_files(recordings: pa.Ta
 
 @pytest.mark.nightly
 def test_the_questions_find_what_is_wrong_with_the_lines(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    line = example("production_line")
     # Built together with the package, to share its features: nothing is compiled twice.
     built = ["cargo", "build", "--locked", "-q", "-p", "mimu-rig", "-p", "mimu-python", "--bin", "mimu-rig"]
     subprocess.run(built, cwd=ROOT, check=True)
-    made = line.produce(tmp_path / "recordings", LINES)
+    made = production_line.produce(tmp_path / "recordings", LINES)
     table = pa.table({"label": [one.folder for one in made], "path": [str(tmp_path / "recordings" / one.folder) for one in made]})
     mimu.fit_table(table, parts=tmp_path / "results")
     monkeypatch.chdir(tmp_path)
     database = duckdb.connect()
     worst, drifts, reasons, _ = [database.execute(query).fetchall() for query in database.extract_statements((EXAMPLES / "many_units.sql").read_text())][1:]
-    assert worst[0][:2] == ("C", line.BATCHES[-1]) and worst[0][3] > 2 * worst[1][3]
+    assert worst[0][:2] == ("C", production_line.BATCHES[-1]) and worst[0][3] > 2 * worst[1][3]
     assert [row[:2] for row in drifts if row[-1]] == [("B", "gyro_bias_z")]
     slope, sigma = drifts[0][3:5]
-    assert abs(slope - 100 * line.DRIFT_COUNT) < 3 * sigma < 20
+    assert abs(slope - 100 * production_line.DRIFT_COUNT) < 3 * sigma < 20
     broken = {one.folder: one.broken for one in made if one.broken}
-    assert sum(row[1] for row in reasons) == len(broken) and len(reasons) == len(line.BREAK)
+    assert sum(row[1] for row in reasons) == len(broken) and len(reasons) == len(production_line.BREAK)
     # The output shows one decimal.
     assert all(abs(row[2] - 100.0 * row[1] / LINES) <= 0.05 for row in reasons)
     refused = database.sql("select label from results where error is not null").fetchall()
-    assert {label for (label,) in refused} == set(broken) and set(broken.values()) == set(line.BREAK)
+    assert {label for (label,) in refused} == set(broken) and set(broken.values()) == set(production_line.BREAK)
