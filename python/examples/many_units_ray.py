@@ -22,13 +22,13 @@ def main() -> None:
     parser.add_argument("--rows", type=int, default=100)
     given = parser.parse_args()
 
-    # A fit would start a thread for each core, and Ray starts a task for each.
-    ray.init(runtime_env={"env_vars": {"RAYON_NUM_THREADS": "1"}}, log_to_driver=False)
     left = mimu.not_fitted(pq.read_table(given.recordings), given.results)
     # A block of Ray is a call of `fit_table`, and a file of the results.
     blocks = [left.slice(first, given.rows) for first in range(0, left.num_rows, given.rows)]
     judged: Counter[str] = Counter()
     if blocks:
+        # A fit would start a thread for each core, and Ray starts a task for each.
+        ray.init(runtime_env={"env_vars": {"RAYON_NUM_THREADS": "1"}}, log_to_driver=False)
         parts = {"parts": given.results}
         fitted = ray.data.from_arrow(blocks).map_batches(mimu.fit_table, fn_kwargs=parts, batch_size=None, batch_format="pyarrow")
         for batch in fitted.select_columns(["judgement"]).iter_batches(batch_size=None, batch_format="pyarrow"):

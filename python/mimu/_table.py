@@ -35,7 +35,7 @@ _COLUMNS = {
     "int64": ["rows", "gyro_dwells", "accel_dwells"],
     "list": ["warnings", "problems"],
 }
-#: A part is written under this folder first, and has a file there while a process is at it. Readers of data sets skip names that begin like this.
+#: Folder for marks of running processes and for unfinished parts. Readers of data sets skip names that begin with an underscore.
 _ATTEMPTS = "_attempts"
 
 
@@ -104,19 +104,19 @@ def fit_table(
     same = {"mimu": version("mimu"), "options": said}
 
     def result(row: Mapping[str, Any], ended: bool = False) -> dict[str, Any]:
-        keywords = {name: _value(value) for name, value in row.items() if value.is_valid}
-        label, path = keywords.pop("label"), keywords.pop("path", None)
+        label, path = row["label"].as_py(), row["path"].as_py() if of_paths else None
         found = {"label": label, "path": path, **same}
         begun, used = time.monotonic(), time.process_time()
         try:
             if ended:
                 raise Error.of(label, "two processes ended while they fitted it", "run `mimu fit` on it alone, and watch its memory", kind="worker")
+            keywords = {name: _value(value) for name, value in row.items() if value.is_valid and name not in ("label", "path")}
             with _opened(label, path, of_paths, {**reading, **keywords}, storage) as recording:
                 made = _mimu.fit(recording, given, noise=noise)
                 found |= {"rate_hz": recording.rate_hz, "calibration": made.calibration().to_toml()} | _found(json.loads(made.json()))
         except (KeyboardInterrupt, SystemExit):
             raise
-        # Also a panic, which Python sees as no `Exception`: the other recordings of the batch do not depend on it.
+        # A panic of the compiled part too, which is not an `Exception`: the other recordings of the batch do not depend on it.
         except BaseException as error:
             found |= _refused(error)
         return found | {"seconds": time.monotonic() - begun, "processor_s": time.process_time() - used}
@@ -155,13 +155,13 @@ class _Folder:
 
     @contextmanager
     def mark(self, name: str) -> Iterator[None]:
-        """A file with host and number of this process while it is at something. It is left only by a process that is killed."""
+        """A file with host and number of this process during some work. Only a process that is killed leaves it behind."""
         path = f"{self.root}/{name}"
         self.system.pipe_file(path, f"{socket.gethostname()} {os.getpid()}".encode())
         try:
             yield
         finally:
-            # Another process may be at the same, and may have finished.
+            # An engine may run the same batch twice, and the other process may have finished.
             with suppress(FileNotFoundError):
                 self.system.rm_file(path)
 
@@ -183,7 +183,8 @@ def _part(table: Any, result: Any, same: Mapping[str, str], folder: _Folder) -> 
         if found.schema == fit_table_schema() and found["path"].to_pylist() == paths and all(found[key].unique().to_pylist() == [value] for key, value in same.items()):
             return found
     folder.system.makedirs(f"{folder.root}/{_ATTEMPTS}", exist_ok=True)
-    # A process that is killed leaves its mark. The next one then marks each recording before its fit, so that it is known at which one processes end.
+    # A process that is killed leaves its mark. The next one then marks each recording before its fit, which shows the recording that ends processes. Marks for
+    # each recording cost two requests to a store beside every fit, so a batch that has not failed does without.
     ended = folder.has(attempt)
     with folder.mark(attempt):
         rows = []
@@ -209,7 +210,7 @@ def _part(table: Any, result: Any, same: Mapping[str, str], folder: _Folder) -> 
 
 
 def _check(names: list[str], of_paths: bool) -> None:
-    """Refuses columns that mean nothing here: their values would be missing from the results without a word."""
+    """Refuses columns without a meaning here: their values would be missing from the results, and nothing would say so."""
     taken = set(inspect.signature(read if of_paths else Recording).parameters) - {"files", "output"} | {"label", "path"}
     for name in names:
         if name not in taken:
@@ -285,7 +286,7 @@ def _found(data: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _refused(error: BaseException) -> dict[str, Any]:
-    """The columns of a refusal. What is no refusal of mimu is one of its kind: of a file system, or a fault."""
+    """The columns of a refusal: by mimu, by a file system, or any other error."""
     if isinstance(error, Error):
         return {"error": str(error)} | {f"error_{part}": getattr(error, part) for part in _REFUSAL}
     return {"error": repr(error), "error_kind": "io" if isinstance(error, OSError) else "exception", "error_problem": repr(error)}

@@ -259,6 +259,14 @@ fn interval(variance: f64, of_estimate: f64) -> Sigma {
             },
         };
     }
+    // The variance of the estimate underflows where copies of one file repeat exactly; the distribution has no such limit.
+    if dof == f64::INFINITY {
+        return Sigma {
+            value,
+            lower: value,
+            upper: value,
+        };
+    }
     let quantile = |p: f64| ChiSquared::new(dof).map_or(f64::NAN, |d| d.inverse_cdf(p));
     Sigma {
         value,
@@ -339,6 +347,12 @@ mod tests {
             }
         }
         (values, units, appraisers)
+    }
+
+    #[test]
+    fn an_exact_variance_has_no_width() {
+        let exact = interval(4.0, 0.0);
+        assert_eq!((exact.value, exact.lower, exact.upper), (2.0, 2.0, 2.0));
     }
 
     #[test]

@@ -9,7 +9,7 @@ use crate::error::Result;
 /// Hands the cells of the columns `names` to `row`, empty for null. Returns `false`, before any row, if the file lacks one of them.
 ///
 /// # Errors
-/// The file cannot be read, is damaged, or has none of Parquet's plain types in these columns.
+/// The file cannot be read or is damaged, or one of these columns is nested.
 pub fn text_columns<const N: usize>(
     path: &Path,
     names: [&str; N],
