@@ -2,6 +2,7 @@
 
 It runs in an environment with the package and with nbclient (python/environment.sh)."""
 
+import contextlib
 import dataclasses
 import inspect
 import os
@@ -103,11 +104,13 @@ def signature(name, function):
 
 def members(cls):
     """Attributes of a result with the comments of its source, and the methods of a class."""
-    lines = []
-    try:
-        source = inspect.getsource(cls).splitlines()
-    except (OSError, TypeError):
-        source = []
+    lines, source = [], []
+    # Its own, and those of the bases that results share.
+    bases = [base for base in cls.__mro__ if base.__module__.split(".")[0] == "mimu"]
+    for base in bases:
+        # A class of the compiled part has no source.
+        with contextlib.suppress(OSError, TypeError):
+            source += inspect.getsource(base).splitlines()
     comment = []
     for line in source:
         if said := re.match(r"    #: (.*)", line):
@@ -117,7 +120,8 @@ def members(cls):
             comment = []
         elif line.strip():
             comment = []
-    for name, member in sorted(vars(cls).items()):
+    inherited = {name: member for base in reversed(bases) for name, member in vars(base).items()}
+    for name, member in sorted(inherited.items()):
         documented = inspect.getdoc(member)
         if name.startswith("_") or not documented or (dataclasses.is_dataclass(cls) and not callable(member)):
             continue

@@ -26,6 +26,7 @@ from mimu._mimu import Calibration, Noise, Recording
 from mimu._noise_in_use import Biases, Cause, Consistency, Density, Estimate, Mounted, Nees, NoiseInUse, noise_in_use
 from mimu._recording import read
 from mimu._result import Judgement, Message
+from mimu._table import fit_table, fit_table_schema, not_fitted
 
 __version__ = _version("mimu")
 
@@ -34,5 +35,6 @@ __all__ = [
     "Effect", "Error", "Estimate", "Export", "Figures", "Fit", "Judgement", "Leftover", "Message", "Mounted", "Nees", "NextExperiment", "Noise",
     "NoiseCoefficient", "NoiseInUse", "NotExcited", "Parameter", "ParameterSigma", "Recording", "Rejected",
     "SensorDiagnosis", "SensorFit", "SensorVerification", "SessionsFit", "Shown", "Verification", "allan", "design", "diagnose",
-    "export", "fit", "fit_sessions", "load", "load_noise", "next_experiment", "noise_in_use", "read", "thermal", "verify",
+    "export", "fit", "fit_sessions", "fit_table", "fit_table_schema", "load", "load_noise", "next_experiment", "noise_in_use", "not_fitted", "read",
+    "thermal", "verify",
 ]

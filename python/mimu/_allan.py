@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 from typing import Any, Literal
 
 from mimu import _frame, _mimu, _plot
 from mimu._arguments import CalibrationLike, arguments, calibration_of, several
 from mimu._error import Error
-from mimu._mimu import Noise, Recording
-from mimu._result import Array, Judgement, Message, Result, judged, messages, typed
+from mimu._mimu import Recording
+from mimu._result import Array, GivesNoise, Message
 
 
 @dataclass(frozen=True)
@@ -51,26 +50,15 @@ class Channel:
     useful_average_s: float | None
 
 
-class Allan(Result):
+class Allan(GivesNoise):
     """Allan deviation and noise model of a unit at rest."""
 
     _native: _mimu.Allan
     _questions = ("json", "text", "html", "svg", "noise")
 
     channels: list[Channel]
-    #: Whether it may be used.
-    judgement: Judgement
     #: Warnings, one sentence each, with its ``kind``.
     warnings: list[Message]
-    device: str
-
-    def __init__(self, native: _mimu.Allan) -> None:
-        super().__init__(native)
-        data = self.to_dict()
-        self.channels = [typed(Channel, channel) for channel in data["channels"]]
-        self.judgement = judged(data)
-        self.warnings = messages(data)
-        self.device = data["device"]
 
     def __getitem__(self, name: str) -> Channel:
         """The first channel of this name: ``gyro_x`` to ``accel_z``."""
@@ -78,19 +66,6 @@ class Allan(Result):
             if channel.name == name:
                 return channel
         raise KeyError(name)
-
-    @property
-    def noise(self) -> Noise:
-        """The argument ``noise`` of :func:`mimu.fit` and others."""
-        return self._native.noise()
-
-    def to_toml(self) -> str:
-        """The noise file that ``mimu allan -o`` writes."""
-        return self.noise.to_toml()
-
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes the noise file, as ``mimu allan -o`` does: whole or not at all."""
-        self.noise.save(path)
 
     def to_dataframe(self) -> Any:
         """The curves as a table of pandas: a row for each channel and averaging time."""
@@ -116,9 +91,6 @@ class Allan(Result):
     def svg(self) -> str:
         """The plot that ``mimu allan --plot`` writes."""
         return self._native.svg()
-
-    def __str__(self) -> str:
-        return self._native.text()
 
     def __repr__(self) -> str:
         return f"<mimu.Allan of {self.device!r}: {', '.join(channel.name for channel in self.channels)}>"

@@ -6,12 +6,12 @@ import os
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 from mimu import _mimu
 from mimu._arguments import arguments
 from mimu._mimu import Recording
-from mimu._result import Array, Result, typed
+from mimu._result import Array, Result
 
 Reference = Literal["table", "gravity"]
 Table = Literal["three-axis", "two-axis", "faces", "hand"]
@@ -49,24 +49,9 @@ class Design(Result):
     #: Parameters that it does not determine.
     undetermined: list[str]
 
-    def __init__(self, native: _mimu.Design) -> None:
-        super().__init__(native)
-        data = self.to_dict()
-        self.title = data["title"]
-        self.positions = typed(Array, data["positions"]).reshape(-1, 3)
-        self.rates_dps = typed(Array, data["rates_dps"]) if "rates_dps" in data else None
-        self.d_efficiency = data["d_efficiency"]
-        self.sigma_per_parameter = [typed(ParameterSigma, sigma) for sigma in data["sigma_per_parameter"]]
-        self.dwell_s = data["dwell_s"]
-        self.time_s = data["time_s"]
-        self.undetermined = data["undetermined"]
-
     def to_toml(self) -> str:
         """The plan that ``mimu design -o`` writes, for a table or a person to carry out."""
         return self._native.plan()
-
-    def __str__(self) -> str:
-        return self._native.text()
 
     def __repr__(self) -> str:
         quality = "with a prior" if self.d_efficiency is None else f"D-efficiency {self.d_efficiency:.3f}"
@@ -118,27 +103,12 @@ class NextExperiment(Result):
     dwell_s: float
     time_s: float
 
-    def __init__(self, native: _mimu.Design) -> None:
-        super().__init__(native)
-        data = self.to_dict()
-        self.title = data["title"]
-        self.experiment = data["experiment"]
-        self.effects = [typed(Shown, effect) for effect in data["effects"]]
-        self.positions = typed(Array, data["positions"]).reshape(-1, 3)
-        self.rates_dps = typed(Array, data["rates_dps"])
-        self.begin_s = typed(Array, data["begin_s"])
-        self.chamber_c = typed(Array, data["chamber_c"]).reshape(-1, 2)
-        self.cold_start = data["cold_start"]
-        self.sigma_per_parameter = [typed(CoefficientSigma, sigma) for sigma in data["sigma_per_parameter"]]
-        self.dwell_s = data["dwell_s"]
-        self.time_s = data["time_s"]
+    def _fill(self, data: dict[str, Any]) -> None:
+        self.chamber_c = self.chamber_c.reshape(-1, 2)
 
     def to_toml(self) -> str:
         """The plan that ``mimu design --effects -o`` writes, for a table or a person to carry out."""
         return self._native.plan()
-
-    def __str__(self) -> str:
-        return self._native.text()
 
     def __repr__(self) -> str:
         return f"<mimu.NextExperiment {self.title}: {len(self.positions)} dwells>"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -11,8 +10,8 @@ from mimu import _mimu
 from mimu._arguments import CalibrationLike, NoiseLike, arguments, calibration_of, kept, noise_of, several
 from mimu._error import Error
 from mimu._fit import Keep, Steps
-from mimu._mimu import Calibration, Recording
-from mimu._result import Judgement, Message, Result, judged, messages, typed
+from mimu._mimu import Recording
+from mimu._result import GivesCalibration, Message
 
 
 @dataclass(frozen=True)
@@ -76,11 +75,10 @@ class SensorDiagnosis:
     noise_floor: float
 
 
-class Diagnosis(Result):
+class Diagnosis(GivesCalibration):
     """The effects behind the residual of a unit."""
 
     _native: _mimu.Diagnosis
-    _questions = ("json", "text", "html", "calibration")
     _texts = True
 
     #: ``"clean"``, ``"explained"``, ``"unexplained"`` or ``"untestable"``.
@@ -90,37 +88,8 @@ class Diagnosis(Result):
     not_excited: list[NotExcited]
     leftover: list[Leftover]
     sensors: dict[str, SensorDiagnosis]
-    #: Whether it may be used.
-    judgement: Judgement
     #: Warnings, one sentence each, with its ``kind``.
     warnings: list[Message]
-    device: str
-
-    def __init__(self, native: _mimu.Diagnosis) -> None:
-        super().__init__(native)
-        data = self.to_dict()
-        self.verdict = data["verdict"]
-        self.effects = [typed(Effect, effect) for effect in data["effects"]]
-        self.rejected = [typed(Rejected, effect) for effect in data["rejected"]]
-        self.not_excited = [typed(NotExcited, effect) for effect in data["not_excited"]]
-        self.leftover = [typed(Leftover, item) for item in data["leftover"]]
-        self.sensors = {name: typed(SensorDiagnosis, sensor) for name, sensor in data["sensors"].items()}
-        self.judgement = judged(data)
-        self.warnings = messages(data)
-        self.device = data["device"]
-
-    @property
-    def calibration(self) -> Calibration:
-        """The calibration, with the effects that the unit has."""
-        return self._native.calibration()
-
-    def to_toml(self) -> str:
-        """The calibration file that ``mimu diagnose -o`` writes."""
-        return self.calibration.to_toml()
-
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes the calibration file, as ``mimu diagnose -o`` does: whole or not at all."""
-        self.calibration.save(path)
 
     def to_dataframe(self) -> Any:
         """The coefficients as a table of pandas: a row for each, with ``effect``, ``sensor``, ``coefficient``, ``value``, ``sigma`` and ``unit``."""
@@ -133,9 +102,6 @@ class Diagnosis(Result):
     def text(self, *, everything: bool = False) -> str:
         """What ``mimu diagnose`` prints; ``everything`` as with ``--all --next``."""
         return self._native.text(everything)
-
-    def __str__(self) -> str:
-        return self.text()
 
     def __repr__(self) -> str:
         found = ", ".join(effect.id for effect in self.effects) or "no effect"

@@ -10,7 +10,7 @@ from mimu import _mimu
 from mimu._arguments import CalibrationLike, NoiseLike, Path, arguments, calibration_of, noise_of
 from mimu._fit import Steps
 from mimu._mimu import Calibration, Noise, Recording
-from mimu._result import Judgement, Message, Result, _Kept, judged, messages, typed
+from mimu._result import _Kept, Judged, Message
 
 
 def load(path: Path) -> Calibration:
@@ -41,26 +41,14 @@ class SensorVerification:
     static_rms: float | None
 
 
-class Verification(Result):
+class Verification(Judged):
     """A calibration judged by another recording."""
 
     _native: _mimu.Verification
 
     sensors: dict[str, SensorVerification]
-    #: Whether it may be used.
-    judgement: Judgement
     #: Warnings, one sentence each, with its ``kind``.
     warnings: list[Message]
-
-    def __init__(self, native: _mimu.Verification) -> None:
-        super().__init__(native)
-        data = self.to_dict()
-        self.sensors = {name: typed(SensorVerification, sensor) for name, sensor in data["sensors"].items()}
-        self.judgement = judged(data)
-        self.warnings = messages(data)
-
-    def __str__(self) -> str:
-        return self._native.text()
 
     def __repr__(self) -> str:
         return "<mimu.Verification: " + ", ".join(f"{name} {s.rms:.4g} {s.unit}" for name, s in self.sensors.items()) + ">"

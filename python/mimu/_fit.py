@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, overload
@@ -13,8 +12,8 @@ from numpy.typing import ArrayLike
 from mimu import _mimu, _plot
 from mimu._arguments import NoiseLike, Path, arguments, kept, noise_of, several
 from mimu._error import Error
-from mimu._mimu import Calibration, Recording
-from mimu._result import Array, Judgement, Message, Result, judged, messages, typed
+from mimu._mimu import Recording
+from mimu._result import Array, GivesCalibration, Message, typed
 
 Steps = Literal["given", "found"]
 Sensor = Literal["gyro", "accel"]
@@ -138,7 +137,7 @@ class SensorFit:
         return typed(SensorFit, {**data, **own})
 
 
-class Fit(Result):
+class Fit(GivesCalibration):
     """A calibration of a recording, judged on data held out of the fit."""
 
     _native: _mimu.Fit
@@ -151,30 +150,16 @@ class Fit(Result):
     held_out: dict[str, Figures]
     #: All dwells, used or not.
     dwells: list[Dwell]
-    #: Whether it may be used.
-    judgement: Judgement
-    #: Warnings, one sentence each, with its ``kind``.
-    warnings: list[Message]
     #: What is wrong with the recording, one for each kind.
     problems: list[Problem]
-    device: str
+    #: Warnings, one sentence each, with its ``kind``.
+    warnings: list[Message]
 
-    def __init__(self, native: _mimu.Fit) -> None:
-        super().__init__(native)
-        data = self.to_dict()
-        sensors, covariance = data["sensors"], dict(native.covariance())
+    def _fill(self, data: dict[str, Any]) -> None:
+        sensors, covariance = data["sensors"], dict(self._native.covariance())
         self.gyro, self.accel = (SensorFit._of(sensors[s], covariance[s]) if s in sensors else None for s in ("gyro", "accel"))
         self.held_out = {name: typed(Figures, sensor) for name, sensor in sensors.items()}
-        self.dwells = [typed(Dwell, dwell) for dwell in data["dwells"]]
-        self.judgement = judged(data)
-        self.warnings = messages(data)
         self.problems = [typed(Problem, {"kind": p["id"], "text": p["text"]}) for p in data["recording_problems"]]
-        self.device = data["device"]
-
-    @property
-    def calibration(self) -> Calibration:
-        """The calibration, to apply, save or export."""
-        return self._native.calibration()
 
     @overload
     def apply(self, gyro: ArrayLike, accel: ArrayLike, *, units: str | None = None) -> tuple[Array, Array]: ...
@@ -208,14 +193,6 @@ class Fit(Result):
         """
         return self.calibration.apply(gyro, accel, units=units)
 
-    def to_toml(self) -> str:
-        """The calibration file that ``mimu fit -o`` writes."""
-        return self.calibration.to_toml()
-
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes the calibration file, as ``mimu fit -o`` does: whole or not at all."""
-        self.calibration.save(path)
-
     def to_dataframe(self) -> Any:
         """The parameters as a table of pandas: a row for each, with ``sensor``, ``parameter``, ``value``, ``sigma``, ``lower``, ``upper`` and ``unit``."""
         import pandas
@@ -246,9 +223,6 @@ class Fit(Result):
         ax.set(xlabel="dwell", ylabel=f"error of the {sensor}, {of.unit}", yscale="log")
         ax.legend()
         return ax
-
-    def __str__(self) -> str:
-        return self._native.text()
 
     def __repr__(self) -> str:
         return f"<mimu.Fit of {self.device!r}: held out " + ", ".join(
@@ -322,40 +296,19 @@ def fit(
     return Fit(_mimu.fit(recording, arguments(options), noise=noise_of(noise)))
 
 
-class SessionsFit(Result):
+class SessionsFit(GivesCalibration):
     """One calibration of several sessions of a unit, with what the next power-on makes of it."""
 
     _native: _mimu.SessionsFit
-    _questions = ("json", "text", "html", "calibration")
 
     #: By sensor, then by name as ``"bias_x"``: ``value`` with ``lower`` and ``upper`` of the expected value, ``next_power_on`` with the interval of tomorrow, and
     #: ``between_sigma``. As in the JSON of ``mimu fit``.
     parameters: dict[str, dict[str, dict[str, Any]]]
     #: What does not fit one set of constant parameters, in sentences.
     findings: list[str]
-    #: Whether it may be used.
-    judgement: Judgement
-    device: str
 
-    def __init__(self, native: _mimu.SessionsFit) -> None:
-        super().__init__(native)
-        data = self.to_dict()
+    def _fill(self, data: dict[str, Any]) -> None:
         self.parameters = {name: {p["name"]: p for p in sensor["parameters"]} for name, sensor in data["sensors"].items()}
-        self.findings = data["findings"]
-        self.judgement = judged(data)
-        self.device = data["device"]
-
-    @property
-    def calibration(self) -> Calibration:
-        """The calibration, to apply, save or export: with the intervals of the next power-on."""
-        return self._native.calibration()
-
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes the calibration file, as ``mimu fit -o`` does: whole or not at all."""
-        self.calibration.save(path)
-
-    def __str__(self) -> str:
-        return self._native.text()
 
     def __repr__(self) -> str:
         return f"<mimu.SessionsFit of {self.device!r}: {self.judgement}>"

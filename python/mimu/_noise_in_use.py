@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from mimu import _mimu
 from mimu._arguments import CalibrationLike, NoiseLike, arguments, calibration_of, noise_of
 from mimu._fit import Steps
-from mimu._mimu import Noise, Recording
-from mimu._result import Judgement, Message, Result, judged, messages, typed
+from mimu._mimu import Recording
+from mimu._result import GivesNoise, Message
 
 
 @dataclass(frozen=True)
@@ -87,11 +87,10 @@ class Mounted:
     lever_m: list[Estimate]
 
 
-class NoiseInUse(Result):
+class NoiseInUse(GivesNoise):
     """The densities that explain the errors of dead reckoning in motion."""
 
     _native: _mimu.NoiseInUse
-    _questions = ("json", "text", "html", "noise")
 
     biases: Biases
     #: None by rests.
@@ -101,36 +100,8 @@ class NoiseInUse(Result):
     causes: list[Cause]
     #: For each sensor whose noise is inflated, one sentence that says why.
     sentences: list[str]
-    #: Whether it may be used.
-    judgement: Judgement
     #: Warnings, one sentence each, with its ``kind``.
     warnings: list[Message]
-    device: str
-
-    def __init__(self, native: _mimu.NoiseInUse) -> None:
-        super().__init__(native)
-        data = self.to_dict()
-        self.biases = typed(Biases, data["biases"])
-        self.mounted = typed(Mounted, data["mounted"]) if data["mounted"] else None
-        self.densities = [typed(Density, density) for density in data["densities"]]
-        self.nees = typed(Consistency, data["nees"])
-        self.causes = [typed(Cause, cause) for cause in data["causes"]]
-        self.sentences = data["sentences"]
-        self.judgement = judged(data)
-        self.warnings = messages(data)
-        self.device = data["device"]
-
-    @property
-    def noise(self) -> Noise:
-        """The argument ``noise`` of :func:`mimu.export`, as for Kalibr."""
-        return self._native.noise()
-
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes the noise file, as ``mimu noise -o FILE.toml`` does: whole or not at all."""
-        self.noise.save(path)
-
-    def __str__(self) -> str:
-        return self._native.text()
 
     def __repr__(self) -> str:
         return f"<mimu.NoiseInUse of {self.device!r}: {self.judgement}>"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import json
+import os
 import types
 import warnings
 from collections.abc import Callable
@@ -12,6 +13,8 @@ from typing import Any, ClassVar, Protocol, TypeVar, Union, cast, get_args, get_
 
 import numpy as np
 from numpy.typing import NDArray
+
+from mimu._mimu import Calibration, Noise
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
@@ -47,16 +50,25 @@ class Message(str):
         return str(self), self.kind, self.about
 
 
-def messages(data: dict[str, Any]) -> list[Message]:
-    """The warnings in the JSON of a result."""
-    return [Message(w["text"], w["kind"], w.get("about")) for w in data["warnings"]]
-
-
 class Native(Protocol):
     """A result of the compiled part."""
 
     def json(self) -> str: ...
     def html(self) -> str: ...
+    @property
+    def text(self) -> Any: ...
+
+
+class OfCalibration(Native, Protocol):
+    """One that gives a calibration."""
+
+    def calibration(self) -> Calibration: ...
+
+
+class OfNoise(Native, Protocol):
+    """One that gives noise."""
+
+    def noise(self) -> Noise: ...
 
 
 class _Kept:
@@ -83,9 +95,19 @@ def _unpickled(cls: type[Result], answers: dict[str, Any]) -> Result:
 class Result:
     """A result of mimu. Attributes have their units in their names, or in ``unit`` beside them."""
 
-    def __init__(self, native: Native) -> None:
+    _native: Native
+
+    def __init__(self, native: Any) -> None:
+        """The public attributes of the class are the keys of this name in the JSON, as their types say."""
         self._native = native
         self._json = native.json()
+        data = self.to_dict()
+        for name, hint in _hints(cast(Any, type(self))):
+            setattr(self, name, _value(hint, data.get(name)))
+        self._fill(data)
+
+    def _fill(self, data: dict[str, Any]) -> None:
+        """Attributes that the JSON has in another form."""
 
     #: Questions to the compiled part, without arguments; a pickle keeps their answers.
     _questions: ClassVar[tuple[str, ...]] = ("json", "text", "html")
@@ -108,19 +130,70 @@ class Result:
         """Tables and plots for a notebook, as self-contained HTML."""
         return self._native.html()
 
+    def __str__(self) -> str:
+        return cast(str, self._native.text())
+
+
+class Judged(Result):
+    """A result with a judgement. One that is suspect is also a warning of Python, because its numbers look good."""
+
+    #: Whether it may be used.
+    judgement: Judgement
+
+    def __init__(self, native: Any) -> None:
+        super().__init__(native)
+        if self.judgement.kind == "suspect":
+            # Its reader has called a function that has called this.
+            warnings.warn(str(self.judgement), stacklevel=3)
+
+
+class GivesCalibration(Judged):
+    """A result with a calibration."""
+
+    _native: OfCalibration
+    _questions: ClassVar[tuple[str, ...]] = ("json", "text", "html", "calibration")
+
+    device: str
+
+    @property
+    def calibration(self) -> Calibration:
+        """The calibration, to apply, save or export: with the effects, the curves or the intervals of the next power-on that were found."""
+        return self._native.calibration()
+
+    def to_toml(self) -> str:
+        """The calibration file that the command's ``-o`` writes."""
+        return self.calibration.to_toml()
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Writes the calibration file, as the command's ``-o`` does: whole or not at all."""
+        self.calibration.save(path)
+
+
+class GivesNoise(Judged):
+    """A result with noise."""
+
+    _native: OfNoise
+    _questions: ClassVar[tuple[str, ...]] = ("json", "text", "html", "noise")
+
+    device: str
+
+    @property
+    def noise(self) -> Noise:
+        """The argument ``noise`` of :func:`mimu.fit`, :func:`mimu.export` and others."""
+        return self._native.noise()
+
+    def to_toml(self) -> str:
+        """The noise file that the command's ``-o`` writes."""
+        return self.noise.to_toml()
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Writes the noise file, as the command's ``-o`` does: whole or not at all."""
+        self.noise.save(path)
+
 
 def typed(cls: type[T], data: Any) -> T:
     """``data`` of a JSON as a ``cls``."""
     return cast(T, _value(cls, data))
-
-
-def judged(data: dict[str, Any]) -> Judgement:
-    """The judgement in the JSON of a result. One that is suspect is also a warning of Python, because its numbers look good."""
-    judgement = typed(Judgement, data["judgement"])
-    if judgement.kind == "suspect":
-        # Its reader has called a function that has made a result that has called this.
-        warnings.warn(str(judgement), stacklevel=4)
-    return judgement
 
 
 def _value(hint: Any, data: Any) -> Any:
@@ -133,10 +206,15 @@ def _value(hint: Any, data: Any) -> Any:
         return np.array(data if data is not None else [], dtype=np.float64)
     if origin is list:
         return [_value(args[0], item) for item in data or []]
+    if origin is tuple:
+        return tuple(_value(of, item) for of, item in zip(args, data, strict=True))
     if origin is dict:
-        return {key: _value(args[1], item) for key, item in (data or {}).items()}
+        named = {item["name"]: item for item in data} if isinstance(data, list) else data or {}
+        return {key: _value(args[1], item) for key, item in named.items()}
     if hint is float:
         return float("nan") if data is None else float(data)
+    if hint is Message:
+        return Message(data["text"], data["kind"], data.get("about"))
     if isinstance(hint, type) and is_dataclass(hint):
         return hint(**{name: _value(of, data.get(name)) for name, of in _hints(hint)})
     return data
@@ -144,6 +222,7 @@ def _value(hint: Any, data: Any) -> Any:
 
 @functools.cache
 def _hints(cls: type) -> list[tuple[str, Any]]:
-    """Fields of a dataclass with their types; Python evaluates their text at each call."""
+    """Fields of a dataclass, or public attributes of a result, with their types; Python evaluates their text at each call."""
     hints = get_type_hints(cls)
-    return [(f.name, hints[f.name]) for f in fields(cls) if f.init]
+    names = [f.name for f in fields(cls) if f.init] if is_dataclass(cls) else [name for name in hints if not name.startswith("_")]
+    return [(name, hints[name]) for name in names]

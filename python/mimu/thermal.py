@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 from mimu import _frame, _mimu, _plot
 from mimu._arguments import CalibrationLike, NoiseLike, arguments, calibration_of, noise_of, several
 from mimu._fit import Steps
-from mimu._mimu import Calibration, Recording
-from mimu._result import Array, Judgement, Message, Result, judged, messages, typed
+from mimu._mimu import Recording
+from mimu._result import Array, GivesCalibration, Message
 
 
 @dataclass(frozen=True)
@@ -51,11 +50,10 @@ class SensorThermal:
     lag_reason: str | None
 
 
-class ThermalFit(Result):
+class ThermalFit(GivesCalibration):
     """All parameters over temperature, and the lag of the dies behind the thermometer."""
 
     _native: _mimu.ThermalFit
-    _questions = ("json", "text", "html", "calibration")
 
     #: ``"fitted"``, ``"one-way"`` or ``"misfit"``.
     verdict: str
@@ -64,35 +62,8 @@ class ThermalFit(Result):
     sensors: dict[str, SensorThermal]
     #: By sensor and parameter: ``gyro_bias_x``, ``accel_C_xx``.
     curves: dict[str, Curve]
-    #: Whether it may be used.
-    judgement: Judgement
     #: Warnings, one sentence each, with its ``kind``.
     warnings: list[Message]
-    device: str
-
-    def __init__(self, native: _mimu.ThermalFit) -> None:
-        super().__init__(native)
-        data = self.to_dict()
-        self.verdict = data["verdict"]
-        self.range_c = (data["range_c"][0], data["range_c"][1])
-        self.sensors = {name: typed(SensorThermal, sensor) for name, sensor in data["sensors"].items()}
-        self.curves = {curve["name"]: typed(Curve, curve) for curve in data["curves"]}
-        self.judgement = judged(data)
-        self.warnings = messages(data)
-        self.device = data["device"]
-
-    @property
-    def calibration(self) -> Calibration:
-        """The calibration with its curves."""
-        return self._native.calibration()
-
-    def to_toml(self) -> str:
-        """The calibration file that ``mimu thermal fit -o`` writes."""
-        return self.calibration.to_toml()
-
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes the calibration file, as ``mimu thermal fit -o`` does: whole or not at all."""
-        self.calibration.save(path)
 
     def to_dataframe(self) -> Any:
         """The curves as a table of pandas: a row for each parameter and temperature."""
@@ -109,9 +80,6 @@ class ThermalFit(Result):
         ax.fill_between(of.temp_c, of.lower, of.upper, color=line.get_color(), alpha=0.2, linewidth=0)
         ax.set(xlabel="temperature of the die, °C", ylabel=f"{of.name}, {of.unit}")
         return ax
-
-    def __str__(self) -> str:
-        return self._native.text()
 
     def __repr__(self) -> str:
         return f"<mimu.thermal.ThermalFit of {self.device!r}: {self.verdict}, {self.range_c[0]:.1f} to {self.range_c[1]:.1f} °C>"

@@ -1,4 +1,4 @@
-//! Finds the calibration files of a tree, and reads them.
+//! Finds the calibrations of a tree, and reads them: calibration files, and Parquet tables with one in each row.
 
 use std::path::{Path, PathBuf};
 
@@ -6,7 +6,7 @@ use jiff::civil::Date;
 use mimu::Error;
 use mimu::calibration::Calibration;
 use mimu::data_sheet::{DataSheet, Part, Row};
-use mimu_recording::UNNAMED;
+use mimu_recording::{UNNAMED, text_columns};
 use rayon::prelude::*;
 
 use crate::labels::{self, DATE, LabelTable, Labels, UNIT, slashes};
@@ -15,7 +15,7 @@ use crate::measured::OfCalibration;
 /// One calibration of a unit.
 #[derive(Debug, Clone)]
 pub struct Measurement {
-    /// Path from the root of the tree.
+    /// Path from the root of the tree; of a table's row, its label.
     pub file: String,
     /// Unit: its label, else the number in the file, else its name there, else the name of the file.
     pub unit: String,
@@ -45,7 +45,7 @@ pub struct Tree {
     pub measurements: Vec<Measurement>,
     /// Calibrations that cannot be used.
     pub left_out: Vec<LeftOut>,
-    /// Number of TOML files that are no calibrations.
+    /// Number of TOML and Parquet files that are no calibrations.
     pub others: usize,
     /// Measurements without a row in the table of labels.
     pub unlabelled: usize,
@@ -91,8 +91,11 @@ impl Tree {
         let done = std::sync::atomic::AtomicUsize::new(0);
         let read: Vec<Read> = files
             .par_iter()
-            .map(|(path, relative)| {
-                let read = read(path, relative, search);
+            .flat_map_iter(|(path, relative)| {
+                let read = match is_table(path) {
+                    true => read_table(path, relative, search),
+                    false => vec![read(path, relative, search)],
+                };
                 let k = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
                 if k.is_multiple_of(64) {
                     progress(k as f64 / count as f64);
@@ -121,7 +124,17 @@ enum Read {
     Other,
 }
 
-/// Collects `*.toml` below `folder` with their paths from `root`. A folder that cannot be read is left out, unless it is the root.
+/// Whether it may be a table of results, as `mimu.fit_table` writes it.
+fn is_table(path: &Path) -> bool {
+    has_ending(path, "parquet")
+}
+
+fn has_ending(path: &Path, ending: &str) -> bool {
+    path.extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case(ending))
+}
+
+/// Collects `*.toml` and `*.parquet` below `folder` with their paths from `root`. A folder that cannot be read is left out, unless it is the root.
 fn find(
     root: &Path,
     folder: &Path,
@@ -147,10 +160,7 @@ fn find(
                     reason: error.to_string(),
                 });
             }
-        } else if path
-            .extension()
-            .is_some_and(|e| e.eq_ignore_ascii_case("toml"))
-        {
+        } else if has_ending(&path, "toml") || is_table(&path) {
             files.push((path, relative));
         }
     }
@@ -174,39 +184,60 @@ fn is_other(text: &str) -> bool {
 }
 
 fn read(path: &Path, relative: &Path, search: Search) -> Read {
-    let left_out = |reason: String| {
-        Read::LeftOut(LeftOut {
-            file: slashes(relative),
-            reason,
-        })
-    };
     let text = match mimu_recording::read_text(path) {
         Ok(text) => text,
-        Err(error) => return left_out(error.to_string()),
+        Err(error) => return left_out(relative, error),
     };
     if is_other(&text) {
         return Read::Other;
     }
-    let calibration = match Calibration::parse(&text, &slashes(relative)) {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    of_text(&text, relative, &stem, search)
+}
+
+/// A row with a calibration file in the column `calibration` is read like that file at the path `label`, so that folders in it are labels.
+fn read_table(path: &Path, relative: &Path, search: Search) -> Vec<Read> {
+    let folder = relative.parent().unwrap_or(Path::new(""));
+    let mut rows = Vec::new();
+    let columns = ["label", "error", "calibration"];
+    let read = text_columns(path, columns, |[label, error, calibration]| {
+        let relative = folder.join(label.trim_start_matches('/'));
+        let name = label.rsplit('/').next().unwrap_or_default();
+        rows.push(match calibration.is_empty() {
+            true => left_out(&relative, error),
+            false => of_text(&calibration, &relative, name, search),
+        });
+    });
+    match read {
+        Ok(true) => rows,
+        Ok(false) => vec![Read::Other],
+        Err(error) => vec![left_out(relative, error)],
+    }
+}
+
+fn left_out(relative: &Path, reason: impl ToString) -> Read {
+    Read::LeftOut(LeftOut {
+        file: slashes(relative),
+        reason: reason.to_string(),
+    })
+}
+
+/// The calibration of `text`, at the path `relative`. `name` is the unit's, if nothing else names it.
+fn of_text(text: &str, relative: &Path, name: &str, search: Search) -> Read {
+    let calibration = match Calibration::parse(text, &slashes(relative)) {
         Ok(calibration) => calibration,
-        Err(error) => return left_out(error.to_string()),
+        Err(error) => return left_out(relative, error),
     };
     let of = match OfCalibration::of(&calibration) {
         Ok(of) => of,
-        Err(reason) => return left_out(reason),
+        Err(reason) => return left_out(relative, reason),
     };
     let mut labels = labels::of_folders(relative, search.folders);
-    let stem = || {
-        path.file_stem()
-            .unwrap_or_default()
-            .to_string_lossy()
-            .into_owned()
-    };
     let in_file = || {
         let number = calibration.unit_id.clone();
-        let name =
+        let device =
             Some(calibration.device.clone()).filter(|name| name != UNNAMED && !name.is_empty());
-        number.or(name).unwrap_or_else(stem)
+        number.or(device).unwrap_or_else(|| name.to_owned())
     };
     let mut unit = labels.remove(UNIT).unwrap_or_else(in_file);
     let labelled = search

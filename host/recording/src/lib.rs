@@ -59,7 +59,7 @@ pub use import::{
     Face, ImportOptions, ImportSummary, Inputs, Instance, Jitter, LogOptions, Offset, PerColumn,
     PoseMean, PoseMeans, Preset, PresetUse, Preview, ReadingUnits, ReplacedTriad, Role, Rounds,
     RowFilter, RowRange, Scale, SkippedLines, TimeSummary, TwosComplement, Zero, import, is_log,
-    labelled, log_formats, look, preview,
+    labelled, log_formats, look, preview, text_columns,
 };
 pub use in_memory::{InMemory, usual_rate_hz};
 pub use manifest::{Format, MANIFEST_FILE, Manifest, Source};

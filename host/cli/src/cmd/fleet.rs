@@ -17,6 +17,8 @@ use crate::report::{Made, fleet_page, fleet_text};
 pub struct FleetArgs {
     /// Folders with calibration files of units, at any depth; files too
     ///
+    /// Parquet files of `mimu.fit_table` count as a calibration file in each row, at the path in the column `label`.
+    ///
     /// A folder `fixture=B` labels the files below it. Files with the same unit are repeated measurements. The unit is the label `unit`, or else the number or
     /// name in the file, or else the name of the file; the day is the label `date`, or else that of the file's creation.
     #[arg(required = true, value_name = "DIR")]

@@ -52,6 +52,7 @@ mod summary;
 mod table;
 #[cfg(all(test, feature = "parquet"))]
 mod tests;
+mod text_columns;
 mod time;
 mod unit_names;
 
@@ -76,6 +77,7 @@ pub use reading_units::ReadingUnits;
 pub use row_filter::RowFilter;
 pub use row_range::RowRange;
 pub use summary::{ImportSummary, SkippedLines};
+pub use text_columns::text_columns;
 pub use time::{Jitter, Rounds, TimeSummary};
 
 use joined::Files;

@@ -1,7 +1,4 @@
-"""Recordings of units from three production lines, with known faults: the data of many_units.py and of its tests.
-
-    cargo build -p mimu-rig --bin mimu-rig
-    python production_line.py recordings --units 200
+"""Recordings of units from three production lines, with known faults: the data of the questions in many_units.sql.
 
 The virtual bench (``mimu-rig``, docs/bench.md) turns each unit by hand and records it; it shares no code with mimu. Line B's gyro z drifts
 from unit to unit, line C glued the gyros of its last batch badly, and some files are broken on the way to the disk.
@@ -9,7 +6,6 @@ from unit to unit, line C glued the gyros of its last batch badly, and some file
 
 from __future__ import annotations
 
-import argparse
 import os
 import shutil
 import subprocess
@@ -155,12 +151,3 @@ def produce(root: Path, count: int, bench: Path = BENCH, poses: int = 24) -> lis
     with ThreadPoolExecutor() as pool:
         list(pool.map(lambda unit: record(unit, root, bench, poses), made))
     return made
-
-
-if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n", 1)[0])
-    parser.add_argument("root", type=Path)
-    parser.add_argument("--units", type=int, default=200)
-    parser.add_argument("--bench", type=Path, default=BENCH)
-    given = parser.parse_args()
-    produce(given.root, given.units, given.bench)
