@@ -17,6 +17,7 @@ use mimu_recording::error::Result;
 use serde_json::{Map, Value, json};
 
 use crate::convention::{Bias, Convention, Shape};
+use crate::layout::{Entry, Numbers};
 use crate::remaining::{self, Places};
 use crate::{Export, Page, Sources, Target, body, driver};
 
@@ -65,6 +66,11 @@ impl Target for Adafruit {
     const CONVENTION: Convention =
         Convention::to_input(Shape::Absent, Bias::SubtractedFromReadings);
     const FURTHER_TRIADS: bool = true;
+    const LAYOUT: &[Entry] = &[
+        Entry::of(Sensor::Gyro, Numbers::Bias, "gyro_zerorate"),
+        Entry::of(Sensor::Accel, Numbers::Bias, "accel_zerog"),
+    ];
+    const NOT_READ: &[&str] = &["mag_softiron", "mag_hardiron"];
     const PAGES: &[Page] = &[Page::of("Adafruit (hard and soft iron)", "calibration.h")];
 
     /// # Errors
@@ -79,10 +85,8 @@ impl Target for Adafruit {
                 .into_iter()
                 .flatten(),
         );
-        for (sensor, name) in [
-            (Sensor::Gyro, "gyro_zerorate"),
-            (Sensor::Accel, "accel_zerog"),
-        ] {
+        for entry in Self::LAYOUT {
+            let (sensor, name) = (entry.sensor, entry.key);
             if calibration.table(sensor).is_none() {
                 export.note(format!(
                     "The calibration has no {sensor}, so nothing is written for it."
@@ -99,8 +103,8 @@ impl Target for Adafruit {
             export
                 .remaining
                 .push(remaining::scale_factors(sensor, &gain));
-            let bias = Self::CONVENTION.of(&readings)?.bias;
-            all.push((name, sensor.unit(), bias.as_slice().to_vec()));
+            let values = entry.values(&Self::CONVENTION.of(&readings)?);
+            all.push((name, sensor.unit(), values));
         }
         export.temperature(calibration);
         if options.layout == Layout::Json {

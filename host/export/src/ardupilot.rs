@@ -19,6 +19,7 @@ use mimu_recording::error::{Argument, Result};
 use nalgebra::Vector3;
 
 use crate::convention::{Bias, Convention, Shape, within};
+use crate::layout::{Entry, Numbers};
 use crate::parameters::{
     CONVENTION, Compass, FurtherTriad, GIVE_FACTOR, LETTERS, Options, Parameter,
 };
@@ -63,6 +64,12 @@ impl Target for ArduPilot {
     const CONVENTION: Convention = CONVENTION;
     const TAKES_BIASES: bool = true;
     const FURTHER_TRIADS: bool = true;
+    const LAYOUT: &[Entry] = &[
+        Entry::of(Sensor::Accel, Numbers::Bias, "INS_ACCOFFS_{AXIS}"),
+        Entry::of(Sensor::Accel, Numbers::LeftDiagonal, "INS_ACCSCAL_{AXIS}"),
+        Entry::of(Sensor::Gyro, Numbers::Bias, "INS_GYROFFS_{AXIS}"),
+    ];
+    const NOT_READ: &[&str] = &["INS_TCAL1", "COMPASS_OFS", "INS_ACC2OFFS", "INS_GYR2OFFS"];
     const PAGES: &[Page] = &[Page::of("ArduPilot", "ardupilot.parm")];
 
     /// # Errors

@@ -10,13 +10,15 @@
 
 use clap::Args;
 use mimu::quantity::{PerSensor, Sensor};
+use mimu_allan::model::Term;
 use mimu_core::compensation::Affine;
 use mimu_recording::error::{Error, Result};
 use nalgebra::Matrix3;
 use serde::Serialize;
 
-use crate::convention::{Bias, Convention, Factors, Parts, Shape, Triangle};
+use crate::convention::{Bias, Convention, Factors, Shape, Triangle};
 use crate::driver::{self, Readings};
+use crate::layout::{Entry, NoiseKey, Numbers};
 use crate::remaining::Places;
 use crate::worst_axis::{Densities, NoiseOptions};
 use crate::{Export, Page, Sources, Target, heading};
@@ -67,6 +69,17 @@ impl Target for Basalt {
     const READERS: &str = "Basalt";
     const CONVENTION: Convention = Convention::to_input(Shape::Whole, Bias::SubtractedFromInput);
     const NOISE: crate::Noise = crate::Noise::Optional;
+    const LAYOUT: &[Entry] = &[
+        Entry::of(Sensor::Accel, Numbers::BiasThenLower, "calib_accel_bias").scaled(1.0, 1.0),
+        Entry::of(Sensor::Gyro, Numbers::BiasThenLeft, "calib_gyro_bias").scaled(1.0, 1.0),
+    ];
+    const NOISE_KEYS: &[NoiseKey] = &[
+        NoiseKey::density("accel_noise_std", "", Sensor::Accel, Term::N),
+        NoiseKey::density("gyro_noise_std", "", Sensor::Gyro, Term::N),
+        NoiseKey::density("accel_bias_std", "", Sensor::Accel, Term::K),
+        NoiseKey::density("gyro_bias_std", "", Sensor::Gyro, Term::K),
+    ];
+    const RATE_KEY: Option<&str> = Some("imu_update_rate");
     const PAGES: &[Page] = &[Page::of("Basalt", "basalt_imu.json")];
 
     /// # Errors
@@ -118,8 +131,8 @@ impl Target for Basalt {
         let gyro = in_frame(readings.gyro, gyro)?;
         let accel = in_frame(readings.accel, triangle.transpose())?;
         let value0 = Value0 {
-            calib_accel_bias: parameters(&accel, |i, j| i >= j),
-            calib_gyro_bias: parameters(&gyro, |_, _| true),
+            calib_accel_bias: Self::LAYOUT[0].values(&accel),
+            calib_gyro_bias: Self::LAYOUT[1].values(&gyro),
             noise,
         };
         let about = heading::of(&export, from);
@@ -130,16 +143,6 @@ impl Target for Basalt {
         })?;
         Ok(export.with(text + "\n"))
     }
-}
-
-/// b and the elements of S that `has` a place, by columns.
-fn parameters(of: &Parts, has: impl Fn(usize, usize) -> bool) -> Vec<f64> {
-    let s = of.left - Matrix3::identity();
-    let mut out: Vec<f64> = of.bias.iter().copied().collect();
-    for j in 0..3 {
-        out.extend((0..3).filter(|i| has(*i, j)).map(|i| s[(i, j)]));
-    }
-    out
 }
 
 fn densities(axes: &PerSensor<[Densities; 3]>, rate: f64) -> Noise {

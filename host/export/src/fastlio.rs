@@ -10,8 +10,9 @@ use mimu::quantity::Sensor::{Accel, Gyro};
 use mimu_allan::model::Term::{K, N};
 use mimu_recording::error::Result;
 
+use crate::layout::{NoiseKey, NoiseOf};
 use crate::worst_axis::{NoiseOptions, keys_file};
-use crate::{Export, Noise, Page, Sources, Target};
+use crate::{Export, Noise, Page, Sources, Target, noise_interval};
 
 /// Options of the file.
 #[derive(Debug, Clone, Args)]
@@ -34,6 +35,12 @@ impl Target for FastLio {
     const CONTENTS: &str = "variances of one sample";
     const READERS: &str = "FAST-LIO (`--ros2` likewise)";
     const NOISE: Noise = Noise::Only;
+    const NOISE_KEYS: &[NoiseKey] = &[
+        NoiseKey::density("acc_cov", "(m/s^2)^2", Accel, N).of(NoiseOf::Variance),
+        NoiseKey::density("gyr_cov", "(rad/s)^2", Gyro, N).of(NoiseOf::Variance),
+        NoiseKey::density("b_acc_cov", "(m/s^3)^2", Accel, K).of(NoiseOf::Variance),
+        NoiseKey::density("b_gyr_cov", "(rad/s^2)^2", Gyro, K).of(NoiseOf::Variance),
+    ];
     const PAGES: &[Page] = &[Page::of("FAST-LIO", "fastlio.yaml")];
 
     /// # Errors
@@ -43,23 +50,15 @@ impl Target for FastLio {
         let rate = options.noise.rate_hz(noise);
         let mut export = Export::new::<Self>(from);
         export.formula(format!(
-            "Variances of one sample at {rate:.3} Hz: acc_cov = N^2 rate, b_acc_cov = K^2 rate, and so for the gyro; the worst axis, with the {} % interval behind each.",
-            100.0 * noise.confidence
+            "Variances of one sample at {rate:.3} Hz: acc_cov = N^2 rate, b_acc_cov = K^2 rate, and so for the gyro; the worst axis{}.",
+            noise_interval(noise, ", with the {} % interval behind each")
         ));
         export.note("Copy these keys into the configuration of FAST-LIO.");
         let (layout, indent) = match options.ros2 {
             true => ("/**:\n  ros__parameters:\n    mapping:\n", "      "),
             false => ("mapping:\n", "  "),
         };
-        let keys = [
-            ("acc_cov", "(m/s^2)^2", Accel, N),
-            ("gyr_cov", "(rad/s)^2", Gyro, N),
-            ("b_acc_cov", "(m/s^3)^2", Accel, K),
-            ("b_gyr_cov", "(rad/s^2)^2", Gyro, K),
-        ];
         let text = ["", layout, indent];
-        keys_file(export, from, &options.noise.walks, text, keys, |density| {
-            density * density * rate
-        })
+        keys_file::<Self>(export, from, (&options.noise.walks, rate), text)
     }
 }

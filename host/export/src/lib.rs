@@ -8,6 +8,10 @@
 //! | [`kalibr`], [`openvins`], [`px4`], [`core`] ... | one format each |
 //! | [`format`](mod@format) | what a format declares, and the subcommands |
 //! | [`convention`] | how programs write the model of a triad: direction, factors, sign and place of the bias |
+//! | [`layout`] | where the numbers of a convention, and the noise, are in a file |
+//! | [`keyed`] | the numbers of a text file by their keys, whatever its syntax |
+//! | [`foreign`] | files of other programs, read |
+//! | [`fitting_convention`] | which convention of a file fits a recording of its unit |
 //! | [`driver`] | readings in SI, as converted by a driver |
 //! | [`body`] | triads beyond the first gyro and accelerometer |
 //! | [`worst_axis`] | noise for programs that have one number for three axes |
@@ -33,7 +37,9 @@ mod degrees_per_turn;
 pub mod depthai;
 pub mod driver;
 pub mod fastlio;
+pub mod fitting_convention;
 mod flight_codes;
+pub mod foreign;
 pub mod format;
 pub mod fusion;
 pub mod gazebo;
@@ -46,6 +52,8 @@ pub mod intrinsics;
 pub mod json;
 pub mod judged;
 pub mod kalibr;
+pub mod keyed;
+pub mod layout;
 pub mod liosam;
 pub mod matlab;
 pub mod openvins;
@@ -74,6 +82,15 @@ use crate::judged::JudgedSource;
 use crate::parameters::Parameter;
 use crate::remaining::{Places, Remaining};
 pub use crate::sources::Sources;
+
+/// `text` with the probability of the intervals of `noise` in place of `{}`; empty if it has none.
+pub(crate) fn noise_interval(noise: &NoiseFile, text: &str) -> String {
+    let percent = 100.0 * noise.confidence;
+    match percent.is_finite() {
+        true => text.replace("{}", &percent.to_string()),
+        false => String::new(),
+    }
+}
 
 /// All formats, in the order of `mimu export --help`.
 pub static FORMATS: &[Format] = &[
@@ -183,10 +200,8 @@ impl Export {
 
     /// For a format with continuous-time densities of the worst axis.
     pub(crate) fn continuous_densities(&mut self, noise: &NoiseFile) {
-        let percent = 100.0 * noise.confidence;
-        self.formula(format!(
-            "Continuous-time densities of the worst axis; {percent} % interval behind each."
-        ));
+        let interval = noise_interval(noise, "; {} % interval behind each");
+        self.formula(format!("Continuous-time densities of the worst axis{interval}."));
     }
 
     /// For a format without a place for a calibration.

@@ -18,6 +18,7 @@ use mimu_recording::TriadKind;
 use mimu_recording::error::{Argument, Result};
 
 use crate::convention::{Bias, Convention, Shape, within};
+use crate::layout::{Entry, Numbers};
 use crate::parameters::{CONVENTION, Compass, GIVE_FACTOR, LETTERS, Options, Parameter};
 use crate::remaining::Remaining;
 use crate::{Export, Page, Sources, Target};
@@ -46,6 +47,14 @@ impl Target for Px4 {
     const CONVENTION: Convention = CONVENTION;
     const TAKES_BIASES: bool = true;
     const FURTHER_TRIADS: bool = true;
+    // Before 2020 a gyro had scale factors too.
+    const LAYOUT: &[Entry] = &[
+        Entry::of(Sensor::Accel, Numbers::Bias, "CAL_ACC0_{AXIS}OFF"),
+        Entry::of(Sensor::Accel, Numbers::LeftDiagonal, "CAL_ACC0_{AXIS}SCALE"),
+        Entry::of(Sensor::Gyro, Numbers::Bias, "CAL_GYRO0_{AXIS}OFF"),
+        Entry::of(Sensor::Gyro, Numbers::LeftDiagonal, "CAL_GYRO0_{AXIS}SCALE").optional(),
+    ];
+    const NOT_READ: &[&str] = &["TC_G0", "TC_A0", "CAL_MAG0", "CAL_ACC1", "CAL_GYRO1"];
     const PAGES: &[Page] = &[Page {
         options: "--qgc",
         ..Page::of("PX4, for QGroundControl", "px4.params")

@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::of_fit::{forward_table, physical_table};
 use super::{
-    Calibration, DieTable, FORMULA, INVERSE_DIRECTION, NodeTable, Origin, OverTemperature,
+    Calibration, DieTable, FORMAT, FORMULA, INVERSE_DIRECTION, NodeTable, Origin, OverTemperature,
     TemperatureNode, TriadTable, reference_node,
 };
 use crate::effects::fitted::FittedEffect;
@@ -60,37 +60,88 @@ impl Calibration {
                 format!("it stores the effect \"{effect}\", which this program does not know");
             Error::new(place, problem, "update mimu on this computer")
         };
-        let triad =
-            |model, sensor| triad_table(model, sensor, stored.raw_unit).ok_or_else(singular);
+        let triad = |model: &Affine<f32>, sensor| {
+            let exact = Affine {
+                matrix: model.matrix.map(f64::from),
+                offset: model.offset.map(f64::from),
+            };
+            triad_table(&exact, sensor, stored.raw_unit, "body").ok_or_else(singular)
+        };
         let temperature = over_temperature(stored);
         let range_c = stored.range_c.map(|range| range.map(f64::from));
+        let bare = Self::without_uncertainty(&stored.device, stored.raw_unit);
         let calibration = Self {
             format: Self::format_of(temperature.is_some()).into(),
-            device: stored.device.clone(),
             unit_id: stored.unit_id.clone(),
             created: stored.created.clone(),
             trimmed: stored.trimmed.clone(),
-            between_sessions: None,
-            sessions: Vec::new(),
-            tool: concat!("mimu ", env!("CARGO_PKG_VERSION")).into(),
-            judgement: None,
             sensors: stored.sensors.clone(),
             recording: Origin {
                 sha256: stored.sha256.clone(),
-                reference: None,
-                raw_unit: stored.raw_unit,
-                gravity_mps2: None,
-                clock: None,
                 temp_c: Some(f64::from(node.temp_c)),
                 temp_range_c: range_c.filter(|_| temperature.is_none()),
+                ..bare.recording
             },
             gyro: Some(triad(&node.model.gyro, Sensor::Gyro)?),
             accel: Some(triad(&node.model.accel, Sensor::Accel)?),
             temperature,
             effects: FittedEffect::all_of_device(&stored.effects).map_err(unknown)?,
-            body: Vec::new(),
+            ..bare
         };
         calibration.checked(place)
+    }
+
+    /// The calibration in another program's file, whose numbers are `models`, raw to SI in the axes that `frame` names. It has no uncertainty, no date and no
+    /// judgement, as the file has none.
+    ///
+    /// # Errors
+    /// No program could apply it; `place` names the file.
+    pub fn of_program(
+        models: &PerSensor<Option<Affine<f64>>>,
+        (device, raw_unit, frame): (&str, RawUnit, &str),
+        place: &str,
+    ) -> Result<Self> {
+        let singular = || Error::new(place, "C is singular", "check the numbers of the file");
+        let triad = |sensor: Sensor| {
+            let table = |model| triad_table(model, sensor, raw_unit, frame).ok_or_else(singular);
+            models[sensor].as_ref().map(table).transpose()
+        };
+        let calibration = Self {
+            gyro: triad(Sensor::Gyro)?,
+            accel: triad(Sensor::Accel)?,
+            ..Self::without_uncertainty(device, raw_unit)
+        };
+        calibration.checked(place)
+    }
+
+    /// A calibration without triads, of which nothing but the unit is known.
+    fn without_uncertainty(device: &str, raw_unit: RawUnit) -> Self {
+        Self {
+            format: FORMAT.into(),
+            device: device.into(),
+            unit_id: None,
+            created: None,
+            trimmed: None,
+            between_sessions: None,
+            sessions: Vec::new(),
+            tool: concat!("mimu ", env!("CARGO_PKG_VERSION")).into(),
+            judgement: None,
+            sensors: None,
+            recording: Origin {
+                sha256: None,
+                reference: None,
+                raw_unit,
+                gravity_mps2: None,
+                clock: None,
+                temp_c: None,
+                temp_range_c: None,
+            },
+            gyro: None,
+            accel: None,
+            temperature: None,
+            effects: Vec::new(),
+            body: Vec::new(),
+        }
     }
 
     /// The calibration that leaves readings in SI as they are.
@@ -107,29 +158,13 @@ impl Calibration {
             let remedy = "give the unit's calibration; readings in rad/s and m/s² need none";
             return Err(Error::new(place, problem, remedy));
         }
-        let as_it_is = || Affine {
-            matrix: Matrix3::identity(),
-            offset: Vector3::zeros(),
-        };
-        let model = PerSensor::from_fn(|_| as_it_is());
-        let mut own = Self::of_device(
-            &DeviceCalibration {
-                device: manifest.device.clone(),
+        let as_it_is = PerSensor::both(Some(Affine::identity()));
+        Self::of_program(&as_it_is, (&manifest.device, RawUnit::Si, "body"), &place).map(|own| {
+            Self {
                 unit_id: manifest.unit_id().map(str::to_owned),
-                sensors: None,
-                raw_unit: RawUnit::Si,
-                created: None,
-                trimmed: None,
-                sha256: None,
-                nodes: vec![Node::constant(0.0, model)],
-                range_c: None,
-                lags_s: None,
-                effects: Vec::new(),
-            },
-            &place,
-        )?;
-        own.recording.temp_c = None;
-        Ok(own)
+                ..own
+            }
+        })
     }
 }
 
@@ -169,22 +204,23 @@ fn over_temperature(stored: &DeviceCalibration) -> Option<OverTemperature> {
 }
 
 /// `None` if the matrix is singular.
-fn triad_table(model: &Affine<f32>, sensor: Sensor, raw_unit: RawUnit) -> Option<TriadTable> {
-    let inverse = Affine {
-        matrix: model.matrix.map(f64::from),
-        offset: model.offset.map(f64::from),
-    };
+fn triad_table(
+    inverse: &Affine<f64>,
+    sensor: Sensor,
+    raw_unit: RawUnit,
+    frame: &str,
+) -> Option<TriadTable> {
     // Without a covariance its sigmas mean nothing, so they are left out.
-    let triad = Triad::from_inverse(inverse, Vec::new())?;
-    let Affine { matrix, offset }: Affine<f64> = inverse;
+    let triad = Triad::from_inverse(*inverse, Vec::new())?;
+    let Affine { matrix, offset } = inverse;
     Some(TriadTable {
         formula: FORMULA.into(),
         direction: INVERSE_DIRECTION.into(),
         raw_unit,
         unit: sensor.unit().into(),
-        frame: "body".into(),
-        C: rows(&matrix),
-        o: exact(&offset),
+        frame: frame.into(),
+        C: rows(matrix),
+        o: exact(offset),
         bias_removed: None,
         sigma_C: None,
         sigma_o: None,
