@@ -8,7 +8,7 @@ use mimu::calibration::Calibration;
 use mimu::calibration::verify::{SensorVerification, verify};
 use mimu::prepared::Prepared;
 use mimu::quantity::{AXES, PerSensor, Sensor};
-use mimu::readable::{STANDARD_GRAVITY, Readable};
+use mimu::readable::{self, STANDARD_GRAVITY};
 use mimu_allan::model::Term;
 use mimu_core::compensation::Affine;
 use mimu_recording::RawUnit;
@@ -68,10 +68,12 @@ impl Reading {
             text += &format!(". The recording does not tell it from a file read {}", self.alike.join(", or "));
         }
         if let Some((file, here)) = self.file_noise.zip(self.noise) {
-            let readable = Readable::of(self.sensor.unit());
-            let [file_shown, here_shown] = [file, here].map(|n| readable.write(n));
+            let density = format!("{}/sqrt(Hz)", self.sensor.unit());
+            let shown = |n: f64| readable::noise(&density).pop().map(|unit| unit.write(n));
             text += &format!(
-                "\n{sensor} white noise in 1 s: the file has {file_shown}, the worst axis of this recording {here_shown}, {:.2} times that of the file",
+                "\n{sensor} white noise: {} in the file, {} on the worst axis of this recording, {:.2} times as much",
+                shown(file).unwrap_or_default(),
+                shown(here).unwrap_or_default(),
                 here / file
             );
         }
@@ -105,7 +107,11 @@ pub fn calibration(foreign: &Foreign, prepared: &Prepared) -> Result<(Calibratio
             found.sensors[sensor].clone()
         };
         let mut candidates = Vec::new();
-        for (changed, mut model) in readings(&foreign.format.convention, &parts, sensor) {
+        let mut all_readings = readings(&foreign.format.convention, &parts, sensor);
+        if foreign.parts[sensor].is_none() {
+            all_readings.truncate(1);
+        }
+        for (changed, mut model) in all_readings {
             if !with_bias {
                 model.offset = bias(prepared, sensor, &model.matrix);
             }

@@ -106,10 +106,7 @@ fn unpacked(bytes: &[u8], place: &str) -> Option<Keyed> {
         true => "gyro",
         false => "accel",
     };
-    let mut unpacked = Keyed {
-        text: file.text,
-        ..Keyed::default()
-    };
+    let mut unpacked = Keyed::without_keys(file.text.clone());
     for (key, range) in [("T", 0..9), ("K", 9..18), ("B", 18..21)] {
         unpacked.add(&format!("{triad}/{key}"), numbers[range].iter().copied());
     }

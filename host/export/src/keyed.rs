@@ -19,10 +19,7 @@ pub struct Keyed {
 impl Keyed {
     /// The keys of this text.
     pub fn of(text: &str) -> Self {
-        let mut keyed = Self {
-            text: text.into(),
-            ..Self::default()
-        };
+        let mut keyed = Self::without_keys(text.into());
         let start = text.trim_start();
         if start.starts_with('{')
             && let Ok(value) = serde_json::from_str(text)
@@ -36,6 +33,12 @@ impl Keyed {
             keyed.lines();
         }
         keyed
+    }
+
+    /// A file with this text, and no keys yet.
+    pub fn without_keys(text: String) -> Self {
+        let entries = Vec::new();
+        Self { entries, text }
     }
 
     /// Adds numbers of a file that is not text.

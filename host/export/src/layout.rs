@@ -250,6 +250,8 @@ pub struct NoiseKey {
     pub of: NoiseOf,
     /// A number of the file 1 is this much in SI.
     pub si: f64,
+    /// For the standard deviation of a Gauss-Markov process: the key of its correlation time T, and the seconds that T counts in, so that K = number / √T.
+    pub correlation: Option<(&'static str, f64)>,
 }
 
 impl NoiseKey {
@@ -268,6 +270,7 @@ impl NoiseKey {
             term,
             of,
             si: 1.0,
+            correlation: None,
         }
     }
 
@@ -281,6 +284,19 @@ impl NoiseKey {
         Self { si, ..self }
     }
 
+    /// The same key with the standard deviation of a process, as in [`Self::correlation`].
+    pub const fn gauss_markov(self, key: &'static str, seconds: f64) -> Self {
+        Self {
+            correlation: Some((key, seconds)),
+            ..self
+        }
+    }
+
+    /// Whether it is the standard deviation of a Gauss-Markov process.
+    pub fn is_gauss_markov(&self) -> bool {
+        self.correlation.is_some()
+    }
+
     /// The number of the file.
     pub fn number(&self, density: f64, rate_hz: f64) -> f64 {
         self.of.number(density, rate_hz) / self.si
@@ -288,7 +304,11 @@ impl NoiseKey {
 
     /// The densities of the file, of x, y and z; `None` if the key is not there.
     pub(crate) fn read(&self, file: &Keyed, rate_hz: f64) -> Option<[f64; 3]> {
-        let density = |number: f64| self.of.density(number * self.si, rate_hz);
+        let time_s = match self.correlation {
+            Some((key, seconds)) => seconds * file.numbers(key)?[0],
+            None => 1.0,
+        };
+        let density = |number: f64| self.of.density(number * self.si / time_s.sqrt(), rate_hz);
         let values = match numbers(self.key, file, 3) {
             Ok(Some(values)) => values,
             _ => file.numbers(self.key)?.to_vec(),

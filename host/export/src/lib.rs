@@ -35,6 +35,7 @@ pub mod convention;
 pub mod core;
 mod degrees_per_turn;
 pub mod depthai;
+pub mod dlio;
 pub mod driver;
 pub mod fastlio;
 pub mod fitting_convention;
@@ -42,6 +43,7 @@ mod flight_codes;
 pub mod foreign;
 pub mod format;
 pub mod fusion;
+mod gauss_markov;
 pub mod gazebo;
 mod heading;
 pub mod iio;
@@ -53,9 +55,11 @@ pub mod json;
 pub mod judged;
 pub mod kalibr;
 pub mod keyed;
+pub mod kf_gins;
 pub mod layout;
 pub mod liosam;
 pub mod matlab;
+pub mod navego;
 pub mod openvins;
 pub mod orbslam3;
 pub mod parameters;
@@ -103,6 +107,9 @@ pub static FORMATS: &[Format] = &[
     Format::of::<orbslam3::OrbSlam3>(),
     Format::of::<liosam::LioSam>(),
     Format::of::<fastlio::FastLio>(),
+    Format::of::<dlio::Dlio>(),
+    Format::of::<kf_gins::KfGins>(),
+    Format::of::<navego::NaveGo>(),
     Format::of::<imu_calib::ImuCalib>(),
     Format::of::<imu_tk::ImuTk>(),
     Format::of::<fusion::Fusion>(),

@@ -15,9 +15,10 @@ use mimu::recording_problem::OfRecording;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::stage;
 
+use crate::opening;
 use crate::arguments::{KeepArgs, NoiseArgs, PartArgs, StillArgs, WholeTurnArgs, with_noise};
 use crate::hint::OF_A_LOG;
-use crate::output::{now, progress, show};
+use crate::output::{check_overwritten, now, progress, show};
 use crate::reading::{LogArgs, read};
 use crate::report::refused;
 use crate::report::{Made, UnitReport, problems_text, unit_page};
@@ -96,6 +97,7 @@ pub fn run(args: &ReportArgs, command_line: &str) -> Result<()> {
     let part = args.part.part()?;
     let inputs = Inputs::of(args)?;
     let outputs = [Some(args.out.as_path())];
+    check_overwritten(&outputs)?;
     let mut others = vec![args.noise.file.as_deref(), inputs.calibration.as_deref()];
     others.extend(args.certificate.inputs());
     let noise = args.noise.read()?;
@@ -132,7 +134,7 @@ pub fn run(args: &ReportArgs, command_line: &str) -> Result<()> {
         }
     };
     let calibration = match (&inputs.calibration, &found) {
-        (Some(path), _) => Calibration::read(path)?,
+        (Some(path), _) => opening::calibration(path)?,
         (None, Some(found)) => found.calibration(&now)?,
         // The arguments require one of the two.
         (None, None) => return Ok(()),

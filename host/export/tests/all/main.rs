@@ -4,6 +4,8 @@ mod body;
 mod judged;
 mod lists;
 mod noise_of_one_axis;
+mod public_files;
+mod read_back;
 mod rust_source;
 mod schema;
 mod stream;

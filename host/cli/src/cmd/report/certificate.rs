@@ -15,6 +15,7 @@ use mimu_recording::ReferenceError;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::stage;
 
+use crate::opening;
 use crate::output::{now, show};
 use crate::report::{Made, certificate_page, refused};
 
@@ -68,7 +69,7 @@ impl CertificateArgs {
             fit(prepared, Options::default()).inspect_err(|_| refused(&problems, false))?;
         let made = Calibration::of(&fitted, &[], &now)?;
         if let Some(file) = given.calibration {
-            refuse_other(&Calibration::read(file)?, &made, file)?;
+            refuse_other(&opening::calibration(file)?, &made, file)?;
         }
         let as_found = self
             .as_found
@@ -99,7 +100,7 @@ impl CertificateArgs {
 
 fn as_found(fitted: &Fit, made: &Calibration, file: &Path) -> Result<AsFound> {
     let name = file.display().to_string();
-    AsFound::of(fitted, made, &Calibration::read(file)?, &name)
+    AsFound::of(fitted, made, &opening::calibration(file)?, &name)
 }
 
 /// Refuses a calibration file whose matrices are not those of the certificate.
