@@ -52,7 +52,9 @@ impl Opened {
         };
         let calibration = other.calibration(raw_unit)?;
         let (place, name) = (&other.place, other.format.name);
-        eprintln!("{place}: read as {name} reads it; mimu verify shows whether another convention fits a recording of the unit");
+        eprintln!(
+            "{place}: read as {name} reads it; mimu verify shows whether another convention fits a recording of the unit"
+        );
         for (sensor, _) in other.parts.present() {
             if !other.has_bias(sensor) {
                 eprintln!("warning: {place}: it has no bias of the {sensor}, which is taken for 0");

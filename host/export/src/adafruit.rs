@@ -12,7 +12,6 @@ use std::fmt::Write as _;
 use clap::{Args, ValueEnum};
 use mimu::calibration::Calibration;
 use mimu::quantity::Sensor;
-use mimu_recording::TriadName;
 use mimu_recording::error::Result;
 use serde_json::{Map, Value, json};
 
@@ -21,9 +20,7 @@ use crate::layout::{Entry, Numbers};
 use crate::remaining::{self, Places};
 use crate::{Export, Page, Sources, Target, body, driver};
 
-/// The only magnetometer with a place.
-const MAG: TriadName = TriadName::MAG;
-/// How it is written.
+/// How a magnetometer is written.
 const MAGNETIC: Convention = Convention::to_input(Shape::Whole, Bias::SubtractedFromReadings);
 
 /// What is written.
@@ -133,9 +130,7 @@ fn magnetometer(
     options: &Options,
     export: &mut Export,
 ) -> Result<Option<[Array; 2]>> {
-    let others = body::left_out(calibration, |name| name == MAG);
-    export.notes.extend(others);
-    let Some(mag) = calibration.body.iter().find(|triad| triad.triad == MAG) else {
+    let Some(mag) = body::only_mag(calibration, export) else {
         export.note("The calibration has no magnetometer, so nothing is written for it.");
         return Ok(None);
     };

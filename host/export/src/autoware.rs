@@ -41,11 +41,19 @@ impl Target for Autoware {
     const CONVENTION: Convention =
         Convention::to_input(Shape::Absent, Bias::SubtractedFromReadings);
     const NOISE: Noise = Noise::Needed;
-    const LAYOUT: &[Entry] =
-        &[Entry::of(Sensor::Gyro, Numbers::Bias, "angular_velocity_offset_{axis}")];
+    const LAYOUT: &[Entry] = &[Entry::of(
+        Sensor::Gyro,
+        Numbers::Bias,
+        "angular_velocity_offset_{axis}",
+    )];
     const NOISE_KEYS: &[NoiseKey] = &[
-        NoiseKey::density("angular_velocity_stddev_{axis}{axis}", "rad/s", Sensor::Gyro, Term::N)
-            .of(NoiseOf::Deviation),
+        NoiseKey::density(
+            "angular_velocity_stddev_{axis}{axis}",
+            "rad/s",
+            Sensor::Gyro,
+            Term::N,
+        )
+        .of(NoiseOf::Deviation),
         NoiseKey::density("acceleration_stddev", "m/s^2", Sensor::Accel, Term::N)
             .of(NoiseOf::Deviation),
     ];
@@ -59,9 +67,8 @@ impl Target for Autoware {
         let gain = readings.as_ref().map(driver::Readings::noise_gain);
         let axes = options.noise.walks.axes(noise, &gain)?;
         let rate = options.noise.rate_hz(noise);
-        let deviations = axes.map(|three| {
-            three.map(|axis| NoiseOf::Deviation.number(axis.white.value, rate))
-        });
+        let deviations =
+            axes.map(|three| three.map(|axis| NoiseOf::Deviation.number(axis.white.value, rate)));
         let mut export = Export::new::<Self>(from);
         export.formula(
             "gyro: output = reading - angular_velocity_offset, rad/s, in the frame of the message",

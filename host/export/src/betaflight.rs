@@ -68,7 +68,12 @@ impl Target for Betaflight {
         let scale = remaining::scale_factors(Sensor::Accel, &accel.gain);
         export.remaining.push(scale);
         export.remaining.push(accel.rounding());
-        let [x, y, z] = whole(Sensor::Accel, &|_| "acc_calibration".into(), &accel.zero, CODES)?;
+        let [x, y, z] = whole(
+            Sensor::Accel,
+            &|_| "acc_calibration".into(),
+            &accel.zero,
+            CODES,
+        )?;
         let mut lines = format!("set acc_calibration = {x},{y},{z},1\n");
         if let Some([zero, gain]) = compass(from, Self::CONVENTION, &mut export)? {
             let [x, y, z] = whole(MAG, &|_| "mag_calibration".into(), &zero, CODES)?;

@@ -46,14 +46,42 @@ impl Target for DepthAi {
     const CONVENTION: Convention = Convention::to_input(Shape::Whole, Bias::AddedToInput);
     const NOISE: Noise = Noise::Optional;
     const LAYOUT: &[Entry] = &[
-        Entry::of(Sensor::Accel, Numbers::LeftBesideBias, "imuCalibrationParams/accelerometer"),
-        Entry::of(Sensor::Gyro, Numbers::LeftBesideBias, "imuCalibrationParams/gyroscope"),
+        Entry::of(
+            Sensor::Accel,
+            Numbers::LeftBesideBias,
+            "imuCalibrationParams/accelerometer",
+        ),
+        Entry::of(
+            Sensor::Gyro,
+            Numbers::LeftBesideBias,
+            "imuCalibrationParams/gyroscope",
+        ),
     ];
     const NOISE_KEYS: &[NoiseKey] = &[
-        NoiseKey::density("noise/accelerometer/{axis}/noiseDensity", "", Sensor::Accel, Term::N),
-        NoiseKey::density("noise/accelerometer/{axis}/randomWalk", "", Sensor::Accel, Term::K),
-        NoiseKey::density("noise/gyroscope/{axis}/noiseDensity", "", Sensor::Gyro, Term::N),
-        NoiseKey::density("noise/gyroscope/{axis}/randomWalk", "", Sensor::Gyro, Term::K),
+        NoiseKey::density(
+            "noise/accelerometer/{axis}/noiseDensity",
+            "",
+            Sensor::Accel,
+            Term::N,
+        ),
+        NoiseKey::density(
+            "noise/accelerometer/{axis}/randomWalk",
+            "",
+            Sensor::Accel,
+            Term::K,
+        ),
+        NoiseKey::density(
+            "noise/gyroscope/{axis}/noiseDensity",
+            "",
+            Sensor::Gyro,
+            Term::N,
+        ),
+        NoiseKey::density(
+            "noise/gyroscope/{axis}/randomWalk",
+            "",
+            Sensor::Gyro,
+            Term::K,
+        ),
     ];
     const PAGES: &[Page] = &[Page::of("OAK cameras (DepthAI)", "imu.json")];
 

@@ -58,7 +58,8 @@ impl Target for Dlio {
             ..readings.gyro
         };
         let gyro = GYRO.of(&gyro)?;
-        let mut out = export.head("#", from) + "dlio:\n  imu:\n    calibration: false\n    intrinsics:\n";
+        let mut out =
+            export.head("#", from) + "dlio:\n  imu:\n    calibration: false\n    intrinsics:\n";
         for entry in Self::LAYOUT {
             let key = entry.key.rsplit('/').next().unwrap_or(entry.key);
             let parts = match entry.sensor {

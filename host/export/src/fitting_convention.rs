@@ -59,13 +59,18 @@ impl Reading {
         let declared = self.rms_as_declared.map_or("no error".into(), show);
         let mut text = match self.changed.as_str() {
             "" => format!("{sensor}: read as {format} reads it, error {rms}"),
-            changed => format!("{sensor}: fits {changed}, error {rms}; as {format} reads it {declared}"),
+            changed => {
+                format!("{sensor}: fits {changed}, error {rms}; as {format} reads it {declared}")
+            }
         };
         if self.bias_of_recording {
             text += ". The file has no bias: that of this recording is taken";
         }
         if !self.alike.is_empty() {
-            text += &format!(". The recording does not tell it from a file read {}", self.alike.join(", or "));
+            text += &format!(
+                ". The recording does not tell it from a file read {}",
+                self.alike.join(", or ")
+            );
         }
         if let Some((file, here)) = self.file_noise.zip(self.noise) {
             let density = format!("{}/sqrt(Hz)", self.sensor.unit());
@@ -120,7 +125,9 @@ pub fn calibration(foreign: &Foreign, prepared: &Prepared) -> Result<(Calibratio
             }
         }
         let by_error = |c: &&(String, Affine<f64>, SensorVerification)| merit(&c.2);
-        let best = candidates.iter().min_by(|a, b| by_error(a).total_cmp(&by_error(b)));
+        let best = candidates
+            .iter()
+            .min_by(|a, b| by_error(a).total_cmp(&by_error(b)));
         let Some((_, _, best)) = best.cloned() else {
             models[sensor] = foreign.format.convention.inverse(&parts);
             continue;
@@ -158,11 +165,7 @@ fn merit(found: &SensorVerification) -> f64 {
 }
 
 /// The readings of these numbers, the format's own first and the simpler ones before others, each with what it changes.
-fn readings(
-    convention: &Convention,
-    parts: &Parts,
-    sensor: Sensor,
-) -> Vec<(String, Affine<f64>)> {
+fn readings(convention: &Convention, parts: &Parts, sensor: Sensor) -> Vec<(String, Affine<f64>)> {
     let mut all: Vec<(String, Affine<f64>)> = Vec::new();
     let mut add = |changed: [&str; 2], model: Option<Affine<f64>>| {
         let Some(model) = model else { return };
@@ -214,7 +217,10 @@ fn matrices(parts: &Parts) -> Vec<(&'static str, Matrix3<f64>, Matrix3<f64>)> {
     let one = Matrix3::identity();
     let Parts { left, right, .. } = parts;
     let product = left * right;
-    let mut all = vec![("", *left, *right), ("with its matrix transposed", product.transpose(), one)];
+    let mut all = vec![
+        ("", *left, *right),
+        ("with its matrix transposed", product.transpose(), one),
+    ];
     if let Some(inverse) = product.try_inverse() {
         all.push(("with its matrix inverted", inverse, one));
         let both = inverse.transpose();
@@ -239,17 +245,28 @@ fn biases(
         (Bias::SubtractedFromInput, _) => Bias::SubtractedFromReadings,
         (own, _) => own,
     };
-    let side = Convention { bias: other, ..*convention };
+    let side = Convention {
+        bias: other,
+        ..*convention
+    };
     let mut all = vec![
         ("", *convention, bias),
         ("with the sign of its bias changed", *convention, -bias),
         ("with its bias on the other side of the matrix", side, bias),
     ];
     match sensor {
-        Sensor::Gyro => all.push(("with its bias in deg/s", *convention, bias * 1f64.to_radians())),
+        Sensor::Gyro => all.push((
+            "with its bias in deg/s",
+            *convention,
+            bias * 1f64.to_radians(),
+        )),
         Sensor::Accel => {
             all.push(("with its bias in g", *convention, bias * STANDARD_GRAVITY));
-            all.push(("with its bias in mg", *convention, bias * 1e-3 * STANDARD_GRAVITY));
+            all.push((
+                "with its bias in mg",
+                *convention,
+                bias * 1e-3 * STANDARD_GRAVITY,
+            ));
         }
     }
     all
@@ -258,7 +275,14 @@ fn biases(
 /// The other orders and signs of axes that no mirror makes.
 fn orders() -> Vec<(String, Matrix3<f64>)> {
     let mut all = Vec::new();
-    for order in [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]] {
+    for order in [
+        [0, 1, 2],
+        [1, 2, 0],
+        [2, 0, 1],
+        [0, 2, 1],
+        [2, 1, 0],
+        [1, 0, 2],
+    ] {
         for signs in 0..8 {
             let sign = |i: usize| if signs >> i & 1 == 0 { 1.0 } else { -1.0 };
             let turned = Matrix3::from_fn(|i, j| if order[i] == j { sign(i) } else { 0.0 });
@@ -268,7 +292,10 @@ fn orders() -> Vec<(String, Matrix3<f64>)> {
                     false => AXES[order[i]].to_owned(),
                 };
                 let axes = [0, 1, 2].map(axis).join(", ");
-                all.push((format!("with the recording's axes {axes} as its x, y, z"), turned));
+                all.push((
+                    format!("with the recording's axes {axes} as its x, y, z"),
+                    turned,
+                ));
             }
         }
     }
@@ -299,7 +326,9 @@ fn bias(prepared: &Prepared, sensor: Sensor, matrix: &Matrix3<f64>) -> Vector3<f
             right += along * (gravity - x.norm());
         }
         // Few poses leave a direction open: the smallest change is taken.
-        let step = square.pseudo_inverse(1e-6 * square.amax()).map(|inverse| inverse * right);
+        let step = square
+            .pseudo_inverse(1e-6 * square.amax())
+            .map(|inverse| inverse * right);
         offset += step.unwrap_or_default();
     }
     offset

@@ -93,9 +93,7 @@ pub(crate) fn compass(
     export: &mut Export,
 ) -> Result<Option<[Vector3<f64>; 2]>> {
     let (calibration, place) = from.calibration()?;
-    let others = body::left_out(calibration, |name| name == MAG);
-    export.notes.extend(others);
-    let Some(mag) = calibration.body.iter().find(|triad| triad.triad == MAG) else {
+    let Some(mag) = body::only_mag(calibration, export) else {
         return Ok(None);
     };
     if mag.raw_unit != RawUnit::Count {

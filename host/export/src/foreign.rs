@@ -39,7 +39,12 @@ pub fn read(bytes: &[u8], place: &str) -> Result<Option<Foreign>> {
     for format in FORMATS {
         let whole = format.whole.and_then(|whole| whole(bytes, place));
         if let Some(whole) = whole.transpose()? {
-            return Ok(Some(Foreign::of(format, place, Keyed::default(), Some(whole))?));
+            return Ok(Some(Foreign::of(
+                format,
+                place,
+                Keyed::default(),
+                Some(whole),
+            )?));
         }
         if let Some(file) = format.unpack.and_then(|unpack| unpack(bytes, place)) {
             return Ok(Some(Foreign::of(format, place, file, None)?));
@@ -77,7 +82,10 @@ impl Foreign {
             let of = &mut parts[entry.sensor];
             let mut these = of.unwrap_or_else(nothing);
             let read = entry.read(&file, &mut these).map_err(|(key, count)| {
-                refused(&key, &format!("it is missing, or has fewer numbers than {count}"))
+                refused(
+                    &key,
+                    &format!("it is missing, or has fewer numbers than {count}"),
+                )
             })?;
             match (read, entry.is_optional) {
                 (true, _) => *of = Some(these),
@@ -87,7 +95,10 @@ impl Foreign {
         }
         for (sensor, key) in missing.present() {
             if parts[sensor].is_some() {
-                return Err(refused(key, "it is missing, and the file has other keys of this triad"));
+                return Err(refused(
+                    key,
+                    "it is missing, and the file has other keys of this triad",
+                ));
             }
         }
         // What mimu wrote says the unit in its comments.
@@ -201,8 +212,10 @@ impl Foreign {
             if !white.iter().all(|n| n.is_finite() && *n > 0.0) {
                 let problem = "its noise is that of a sample, and the file does not say the rate, or it is not above 0";
                 let remedy = "give the messages a second";
-                return Err(Error::new(format!("{}, {sensor}", self.place), problem, remedy)
-                    .about(Argument::SampleRate));
+                return Err(
+                    Error::new(format!("{}, {sensor}", self.place), problem, remedy)
+                        .about(Argument::SampleRate),
+                );
             }
             for (i, axis) in AXES.iter().enumerate() {
                 channel.push(NoiseChannel {

@@ -14,7 +14,6 @@ use std::fmt::Write as _;
 use mimu::calibration::Calibration;
 use mimu::quantity::Sensor;
 use mimu::readable::STANDARD_GRAVITY;
-use mimu_recording::TriadName;
 use mimu_recording::error::Result;
 
 use crate::convention::{Bias, Convention, Shape};
@@ -24,9 +23,7 @@ use crate::{Export, Nothing, Page, Sources, Target, body, driver};
 
 /// A degree.
 const DEG: f64 = std::f64::consts::PI / 180.0;
-/// The only magnetometer with a place.
-const MAG: TriadName = TriadName::MAG;
-/// How it is written.
+/// How a magnetometer is written.
 const MAGNETIC: Convention = Convention::to_input(Shape::Whole, Bias::SubtractedFromReadings);
 
 /// The format.
@@ -47,8 +44,12 @@ impl Target for Fusion {
         Entry::of(Sensor::Gyro, Numbers::RightDiagonal, "gyroscopeSensitivity").scaled(0.0, DEG),
         Entry::of(Sensor::Gyro, Numbers::Bias, "gyroscopeOffset"),
         Entry::of(Sensor::Accel, Numbers::Left, "accelerometerMisalignment"),
-        Entry::of(Sensor::Accel, Numbers::RightDiagonal, "accelerometerSensitivity")
-            .scaled(0.0, STANDARD_GRAVITY),
+        Entry::of(
+            Sensor::Accel,
+            Numbers::RightDiagonal,
+            "accelerometerSensitivity",
+        )
+        .scaled(0.0, STANDARD_GRAVITY),
         Entry::of(Sensor::Accel, Numbers::Bias, "accelerometerOffset"),
     ];
     const NOT_READ: &[&str] = &["softIronMatrix", "hardIronOffset"];
@@ -110,9 +111,7 @@ fn magnetometer(
     out: &mut String,
     export: &mut Export,
 ) -> Result<()> {
-    let others = body::left_out(calibration, |name| name == MAG);
-    export.notes.extend(others);
-    let Some(mag) = calibration.body.iter().find(|triad| triad.triad == MAG) else {
+    let Some(mag) = body::only_mag(calibration, export) else {
         return Ok(());
     };
     let parts = MAGNETIC.of(&body::readings(mag, false, Some(1.0), place)?)?;

@@ -32,7 +32,9 @@ pub(crate) fn keys<T: Target>(
     options: &Options,
     factor: f64,
 ) -> Result<(Export, Vec<(&'static NoiseKey, String)>)> {
-    let axes = options.walks.axes(from.noise()?, &PerSensor::both([1.0; 3]))?;
+    let axes = options
+        .walks
+        .axes(from.noise()?, &PerSensor::both([1.0; 3]))?;
     let mut export = Export::new::<T>(from);
     export.note(format!(
         "Biases are Gauss-Markov processes with a correlation time of {} s, whose driving noise is K.",

@@ -48,16 +48,44 @@ impl Target for Gazebo {
     const CONVENTION: Convention = Convention::to_reading(Shape::Absent, Bias::AddedToReadings);
     const NOISE: Noise = Noise::Needed;
     const LAYOUT: &[Entry] = &[
-        Entry::of(Sensor::Gyro, Numbers::Bias, "angular_velocity/{axis}/noise/mean"),
-        Entry::of(Sensor::Accel, Numbers::Bias, "linear_acceleration/{axis}/noise/mean"),
+        Entry::of(
+            Sensor::Gyro,
+            Numbers::Bias,
+            "angular_velocity/{axis}/noise/mean",
+        ),
+        Entry::of(
+            Sensor::Accel,
+            Numbers::Bias,
+            "linear_acceleration/{axis}/noise/mean",
+        ),
     ];
     const NOISE_KEYS: &[NoiseKey] = &[
-        NoiseKey::density("angular_velocity/{axis}/noise/stddev", "", Sensor::Gyro, Term::N)
-            .of(NoiseOf::Deviation),
-        NoiseKey::density("linear_acceleration/{axis}/noise/stddev", "", Sensor::Accel, Term::N)
-            .of(NoiseOf::Deviation),
-        NoiseKey::density("angular_velocity/{axis}/noise/dynamic_bias_stddev", "", Sensor::Gyro, Term::K),
-        NoiseKey::density("linear_acceleration/{axis}/noise/dynamic_bias_stddev", "", Sensor::Accel, Term::K),
+        NoiseKey::density(
+            "angular_velocity/{axis}/noise/stddev",
+            "",
+            Sensor::Gyro,
+            Term::N,
+        )
+        .of(NoiseOf::Deviation),
+        NoiseKey::density(
+            "linear_acceleration/{axis}/noise/stddev",
+            "",
+            Sensor::Accel,
+            Term::N,
+        )
+        .of(NoiseOf::Deviation),
+        NoiseKey::density(
+            "angular_velocity/{axis}/noise/dynamic_bias_stddev",
+            "",
+            Sensor::Gyro,
+            Term::K,
+        ),
+        NoiseKey::density(
+            "linear_acceleration/{axis}/noise/dynamic_bias_stddev",
+            "",
+            Sensor::Accel,
+            Term::K,
+        ),
     ];
     const PAGES: &[Page] = &[Page::of("Gazebo", "imu.sdf")];
 

@@ -111,7 +111,9 @@ impl Keyed {
             let content = line.trim_start();
             let indent = line.len() - content.len();
             let item = content.strip_prefix("- ").unwrap_or(content).trim();
-            let pair = item.split_once(": ").or(item.strip_suffix(':').map(|k| (k, "")));
+            let pair = item
+                .split_once(": ")
+                .or(item.strip_suffix(':').map(|k| (k, "")));
             let brackets = |text: &str| {
                 let count = |all: &[char]| text.chars().filter(|c| all.contains(c)).count();
                 count(&['[', '{', '(']) as i64 - count(&[']', '}', ')']) as i64
@@ -173,7 +175,9 @@ fn without_comment(line: &str) -> &str {
         let at = line.find(sign)?;
         // `/**:` is a node of ROS, and a sign within a word is part of it.
         let before = line[..at].chars().next_back();
-        before.is_none_or(|c| c.is_whitespace() || c == ';' || c == ',').then_some(at)
+        before
+            .is_none_or(|c| c.is_whitespace() || c == ';' || c == ',')
+            .then_some(at)
     });
     &line[..starts.min().unwrap_or(line.len())]
 }

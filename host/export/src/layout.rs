@@ -44,7 +44,9 @@ enum Slot {
 impl Numbers {
     /// Whether β is among them.
     pub fn has_bias(self) -> bool {
-        self.slots().iter().any(|slot| matches!(slot, Slot::Bias(_)))
+        self.slots()
+            .iter()
+            .any(|slot| matches!(slot, Slot::Bias(_)))
     }
 
     fn slots(self) -> Vec<Slot> {

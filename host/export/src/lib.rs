@@ -208,7 +208,9 @@ impl Export {
     /// For a format with continuous-time densities of the worst axis.
     pub(crate) fn continuous_densities(&mut self, noise: &NoiseFile) {
         let interval = noise_interval(noise, "; {} % interval behind each");
-        self.formula(format!("Continuous-time densities of the worst axis{interval}."));
+        self.formula(format!(
+            "Continuous-time densities of the worst axis{interval}."
+        ));
     }
 
     /// For a format without a place for a calibration.

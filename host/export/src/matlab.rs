@@ -65,13 +65,19 @@ impl Target for Matlab {
     const NOISE: Noise = Noise::Optional;
     // The accelerometer of imuSensor has the opposite sign of a real one.
     const LAYOUT: &[Entry] = &[
-        Entry::of(Sensor::Accel, Numbers::Left, "Accelerometer/AxesMisalignment").scaled(0.0, 0.01),
+        Entry::of(
+            Sensor::Accel,
+            Numbers::Left,
+            "Accelerometer/AxesMisalignment",
+        )
+        .scaled(0.0, 0.01),
         Entry::of(Sensor::Accel, Numbers::Bias, "Accelerometer/ConstantBias").scaled(0.0, -1.0),
         Entry::of(Sensor::Gyro, Numbers::Left, "Gyroscope/AxesMisalignment").scaled(0.0, 0.01),
         Entry::of(Sensor::Gyro, Numbers::Bias, "Gyroscope/ConstantBias"),
     ];
     const NOISE_KEYS: &[NoiseKey] = &[
-        NoiseKey::density("Accelerometer/NoiseDensity", "", Sensor::Accel, Term::N).in_si(ROOT_HALF),
+        NoiseKey::density("Accelerometer/NoiseDensity", "", Sensor::Accel, Term::N)
+            .in_si(ROOT_HALF),
         NoiseKey::density("Accelerometer/RandomWalk", "", Sensor::Accel, Term::K).in_si(SQRT_2),
         NoiseKey::density("Gyroscope/NoiseDensity", "", Sensor::Gyro, Term::N).in_si(ROOT_HALF),
         NoiseKey::density("Gyroscope/RandomWalk", "", Sensor::Gyro, Term::K).in_si(SQRT_2),

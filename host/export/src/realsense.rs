@@ -61,9 +61,17 @@ impl Target for RealSense {
         "RealSense cameras of the D400 family with an inertial unit, such as the D435i";
     const CONVENTION: Convention = Convention::to_input(Shape::Whole, Bias::SubtractedFromInput);
     const LAYOUT: &[Entry] = &[
-        Entry::of(Sensor::Accel, Numbers::LeftByColumns, "accelerometer/scale_and_alignment"),
+        Entry::of(
+            Sensor::Accel,
+            Numbers::LeftByColumns,
+            "accelerometer/scale_and_alignment",
+        ),
         Entry::of(Sensor::Accel, Numbers::Bias, "accelerometer/bias"),
-        Entry::of(Sensor::Gyro, Numbers::LeftByColumns, "gyroscope/scale_and_alignment"),
+        Entry::of(
+            Sensor::Gyro,
+            Numbers::LeftByColumns,
+            "gyroscope/scale_and_alignment",
+        ),
         Entry::of(Sensor::Gyro, Numbers::Bias, "gyroscope/bias"),
     ];
     const UNPACK: Option<fn(&[u8], &str) -> Option<Keyed>> = Some(unpacked);
@@ -153,7 +161,11 @@ fn unpacked(bytes: &[u8], _: &str) -> Option<Keyed> {
     let mut file = Keyed::default();
     for (entry, range) in RealSense::LAYOUT.iter().zip([0..9, 9..12, 12..21, 21..24]) {
         let is_in_degrees = range == (21..24);
-        let unit = if is_in_degrees { 1f64.to_radians() } else { 1.0 };
+        let unit = if is_in_degrees {
+            1f64.to_radians()
+        } else {
+            1.0
+        };
         file.add(entry.key, numbers[range].iter().map(|v| v * unit));
     }
     Some(file)

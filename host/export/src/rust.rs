@@ -164,7 +164,9 @@ fn list(values: &[f32]) -> String {
 /// The calibration of such a file. Its effects are calls, which are not read.
 fn whole(bytes: &[u8], place: &str) -> Option<Result<Calibration>> {
     let file = Keyed::of(std::str::from_utf8(bytes).ok()?);
-    let numbers = file.numbers("NODE").filter(|_| file.text.contains("mimu_core"))?;
+    let numbers = file
+        .numbers("NODE")
+        .filter(|_| file.text.contains("mimu_core"))?;
     let affine = |of: &[f64]| Affine {
         matrix: Matrix3::from_row_slice(&of[..9]).cast(),
         offset: Vector3::from_column_slice(&of[9..12]).cast(),

@@ -62,8 +62,7 @@ impl Target for Vins {
         export.note("VINS treats the two readings at the ends of an interval as independent. Multiplied by 1.41, acc_n and gyr_n give the right covariance.");
         export.note("Copy these keys into the configuration of VINS; its other keys are those of cameras and tracking.");
         let text = ["%YAML:1.0\n\n", "", ""];
-        let mut export =
-            keys_file::<Self>(export, from, (&options.noise.walks, rate), text)?;
+        let mut export = keys_file::<Self>(export, from, (&options.noise.walks, rate), text)?;
         export
             .content
             .extend(options.gravity.line("g_norm", from).bytes());

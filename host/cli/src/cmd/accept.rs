@@ -23,10 +23,10 @@ use mimu_station::population::Population;
 use mimu_station::quantities::{Quantities, measure};
 use mimu_station::scale::{Ranges, Scale};
 
-use crate::opening;
 use crate::arguments::{JsonArgs, VerboseArgs, number};
 use crate::cmd::device::{duration, side};
 use crate::cmd::wizard::TextArgs;
+use crate::opening;
 use crate::output::{check_outputs, now, print, show};
 use crate::reading::LogArgs;
 use crate::report::{accept_line, accept_text};

@@ -14,7 +14,7 @@ use mimu_recording::{MANIFEST_FILE, Recording};
 
 use crate::arguments::{JsonArgs, StrictArgs, VerboseArgs, number};
 use crate::hint::OF_A_LOG;
-use crate::output::{check_overwritten, Results, check_outputs, now, progress};
+use crate::output::{Results, check_outputs, check_overwritten, now, progress};
 use crate::reading::{LogArgs, open};
 use crate::status::Status;
 

@@ -6,8 +6,8 @@ use clap::Args;
 use mimu::calibration::comparison::compare;
 use mimu_recording::error::Result;
 
-use crate::opening;
 use crate::arguments::{JsonArgs, VerboseArgs};
+use crate::opening;
 use crate::output::print;
 use crate::report::compare_text;
 

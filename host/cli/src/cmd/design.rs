@@ -20,7 +20,7 @@ use nalgebra::Vector3;
 use serde::Serialize;
 
 use crate::arguments::{JsonArgs, SensorArg, VerboseArgs, number};
-use crate::output::{check_overwritten, Results, check_outputs};
+use crate::output::{Results, check_outputs, check_overwritten};
 use crate::report;
 use noise::NoiseArg;
 

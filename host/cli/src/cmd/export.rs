@@ -138,12 +138,7 @@ pub fn run(args: &ExportArgs) -> Result<()> {
 }
 
 /// Writes the export of `from`, and prints what it contains.
-pub(super) fn written(
-    choice: &Choice,
-    from: &Sources,
-    path: &Path,
-    json: &JsonArgs,
-) -> Result<()> {
+pub(super) fn written(choice: &Choice, from: &Sources, path: &Path, json: &JsonArgs) -> Result<()> {
     let export = choice.export(from)?;
     let content = export.content.clone();
     let result = ExportResult {

@@ -13,10 +13,10 @@ use mimu_export::{Sources, Target, driver};
 use mimu_recording::error::Result;
 use mimu_recording::{MANIFEST_FILE, Recording};
 
-use crate::opening;
 use crate::arguments::{JsonArgs, StillArgs, StrictArgs};
 use crate::hint::OF_A_LOG;
-use crate::output::{check_overwritten, Results, check_outputs, progress};
+use crate::opening;
+use crate::output::{Results, check_outputs, check_overwritten, progress};
 use crate::reading::{LogArgs, open};
 use crate::report;
 use crate::status::Status;

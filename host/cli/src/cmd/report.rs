@@ -15,9 +15,9 @@ use mimu::recording_problem::OfRecording;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::stage;
 
-use crate::opening;
 use crate::arguments::{KeepArgs, NoiseArgs, PartArgs, StillArgs, WholeTurnArgs, with_noise};
 use crate::hint::OF_A_LOG;
+use crate::opening;
 use crate::output::{check_overwritten, now, progress, show};
 use crate::reading::{LogArgs, read};
 use crate::report::refused;

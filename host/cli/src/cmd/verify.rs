@@ -69,7 +69,13 @@ pub(crate) fn run(args: &VerifyArgs) -> Result<Status> {
         Opened::Own(own) => Ok((own.as_ref().clone(), None)),
         Opened::Foreign(other) => {
             let (calibration, readings) = fitting_convention::calibration(other, prepared)?;
-            let lines = [other.place.as_str(), ": a file of ", other.format.name, "\n"].concat();
+            let lines = [
+                other.place.as_str(),
+                ": a file of ",
+                other.format.name,
+                "\n",
+            ]
+            .concat();
             let mut text = readings
                 .iter()
                 .fold(lines, |all, reading| all + &reading.text(other.format.name));
@@ -162,7 +168,11 @@ impl Verified {
 
     /// What the command prints.
     pub fn text(&self, verbose: bool) -> String {
-        let mut text = self.read.as_ref().map(|read| read.0.clone()).unwrap_or_default();
+        let mut text = self
+            .read
+            .as_ref()
+            .map(|read| read.0.clone())
+            .unwrap_or_default();
         text += &report::verify_text(&self.result, verbose);
         text.extend(self.sheet.as_ref().map(data_sheet_text));
         text

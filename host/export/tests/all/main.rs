@@ -1,6 +1,7 @@
 //! Exports whose truth is the compiler, the device, or a published file.
 
 mod body;
+mod conventions;
 mod judged;
 mod lists;
 mod noise_of_one_axis;

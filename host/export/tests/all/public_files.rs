@@ -81,7 +81,10 @@ fn the_noise_of_orb_slam3() {
     let text = "%YAML:1.0\nFile.version: \"1.0\"\nIMU.T_b_c1: !!opencv-matrix\n   rows: 4\n   cols: 4\n   data: [0.0148655429818, -0.999880929698]\n\
                 # IMU noise\nIMU.NoiseGyro: 1.7e-4 #1.6968e-04\nIMU.NoiseAcc: 2.0000e-3 #2.0e-3\nIMU.GyroWalk: 1.9393e-05 \nIMU.AccWalk: 3.0000e-03 # 3e-03\n\
                 IMU.Frequency: 200.0\n";
-    assert_noise(noise(&read("orbslam3", text), None), [1.7e-4, 1.9393e-5, 2e-3, 3e-3]);
+    assert_noise(
+        noise(&read("orbslam3", text), None),
+        [1.7e-4, 1.9393e-5, 2e-3, 3e-3],
+    );
 }
 
 /// TixiaoShan/LIO-SAM, config/params.yaml, as of a version for ROS 2 (041f4e63, BSD-3-Clause).
@@ -90,7 +93,15 @@ fn the_noise_of_lio_sam_for_ros2() {
     let text = "/**:\n  ros__parameters:\n\n    # IMU Settings\n    imuAccNoise: 3.9939570888238808e-03\n    imuGyrNoise: 1.5636343949698187e-03\n    \
                 imuAccBiasN: 6.4356659353532566e-05\n    imuGyrBiasN: 3.5640318696367613e-05\n\n    imuGravity: 9.80511\n";
     let found = noise(&read("liosam", text), None);
-    assert_noise(found, [1.5636343949698187e-3, 3.5640318696367613e-5, 3.9939570888238808e-3, 6.4356659353532566e-5]);
+    assert_noise(
+        found,
+        [
+            1.5636343949698187e-3,
+            3.5640318696367613e-5,
+            3.9939570888238808e-3,
+            6.4356659353532566e-5,
+        ],
+    );
 }
 
 /// hku-mars/FAST_LIO, config/avia.yaml (1087a724, GPL-2.0): its numbers are none of a unit, 0.1 (m/s²)² and 0.1 (rad/s)².
@@ -108,7 +119,11 @@ fn the_intrinsics_of_dlio_are_those_of_calibrated_readings() {
     let text = "dlio:\n\n  version: 1.1.1\n\n  imu:\n    calibration: true\n    intrinsics:\n      accel:\n        bias: [ 0.0, 0.0, 0.0 ]\n        \
                 sm:   [ 1.,  0.,  0.,\n                0.,  1.,  0.,\n                0.,  0.,  1. ]\n      gyro:\n        bias: [ 0.0, 0.0, 0.0 ]\n";
     let file = read("dlio", text);
-    let accel = file.calibration(RawUnit::Si).unwrap().inverse(Sensor::Accel).unwrap();
+    let accel = file
+        .calibration(RawUnit::Si)
+        .unwrap()
+        .inverse(Sensor::Accel)
+        .unwrap();
     assert_eq!(accel, mimu_core::compensation::Affine::identity());
 }
 
@@ -121,7 +136,12 @@ fn the_noise_of_kf_gins() {
     let degree = 1f64.to_radians();
     // gi_engine.cpp: the driving noise of a bias is 2 std² / corrtime.
     let walk = f64::sqrt(2.0 / (4.0 * 3600.0));
-    let expected = [0.003 * degree / 60.0, 0.027 * degree / 3600.0 * walk, 0.03 / 60.0, 15e-5 * walk];
+    let expected = [
+        0.003 * degree / 60.0,
+        0.027 * degree / 3600.0 * walk,
+        0.03 / 60.0,
+        15e-5 * walk,
+    ];
     assert_noise(noise(&read("kf-gins", text), None), expected);
 }
 
@@ -134,7 +154,11 @@ fn the_biases_of_basalt_for_euroc() {
         "imu_update_rate": 200.0, "accel_noise_std": 0.016, "gyro_noise_std": 0.000282, "accel_bias_std": 0.001, "gyro_bias_std": 0.0001}}"#;
     let file = read("basalt", text);
     assert_noise(noise(&file, None), [2.82e-4, 1e-4, 0.016, 1e-3]);
-    let gyro = file.calibration(RawUnit::Si).unwrap().inverse(Sensor::Gyro).unwrap();
+    let gyro = file
+        .calibration(RawUnit::Si)
+        .unwrap()
+        .inverse(Sensor::Gyro)
+        .unwrap();
     assert!((gyro.offset[2] + 0.07668367023977922).abs() < 1e-15);
     assert!((gyro.matrix - nalgebra::Matrix3::identity()).amax() < 1e-15);
 }

@@ -40,7 +40,7 @@ const CASES: [(&str, &[&str], &str, [Kept; 2], f64); 24] = [
     ("c", &[], "count", [Whole, Whole], 1e-6),
     ("rust", &[], "count", [Whole, Whole], 1e-6),
     ("core", &[], "count", [Whole, Whole], 1e-6),
-    ("json", &[], "SI", [Whole, Whole], 0.0),
+    ("json", &[], "SI", [Whole, Whole], 1e-15),
     ("kalibr", &[], "SI", [RotatedMatrix, RotatedMatrix], 1e-8),
     ("kalibr", &["--result"], "SI", [RotatedMatrix, RotatedMatrix], 1e-8),
     ("openvins", &[], "SI", [Matrix, Matrix], 1e-8),
@@ -85,7 +85,11 @@ fn read_back(name: &str, options: &[&str], calibration: &Calibration) -> Foreign
         biases: None,
     };
     let export = format.chosen(&options).unwrap().export(&from).unwrap();
-    let place = if options.contains(&"gyro".into()) { "gyro.calib" } else { "file" };
+    let place = if options.contains(&"gyro".into()) {
+        "gyro.calib"
+    } else {
+        "file"
+    };
     let read = foreign::read(&export.content, place).unwrap();
     read.unwrap_or_else(|| panic!("{name} {options:?} is not recognised"))
 }
@@ -130,14 +134,23 @@ fn what_a_format_keeps_of_a_calibration_is_read_back() {
             assert!(of != Nothing, "{name}: {sensor}");
             if matches!(of, Rotated | RotatedMatrix) {
                 let error = rotation * rotation.transpose() - Matrix3::identity();
-                assert!(error.amax() < 1e-8 && rotation.determinant() > 0.0, "{name}");
+                assert!(
+                    error.amax() < 1e-8 && rotation.determinant() > 0.0,
+                    "{name}"
+                );
             }
             // Compared at inputs of up to 1 g and 100 deg/s.
             let expected = kept(&models[sensor], of, &rotation);
             for k in 0..6 {
                 let size = if k % 2 == 0 { 1.75 } else { -1.75 };
-                let size = if sensor == Sensor::Gyro { size } else { 5.6 * size };
-                let raw = Forward::of(&models[sensor]).unwrap().apply(&Vector3::ith(k / 2, size));
+                let size = if sensor == Sensor::Gyro {
+                    size
+                } else {
+                    5.6 * size
+                };
+                let raw = Forward::of(&models[sensor])
+                    .unwrap()
+                    .apply(&Vector3::ith(k / 2, size));
                 let error = (found.apply(&raw) - expected.apply(&raw)).amax();
                 assert!(error <= most, "{name} {options:?}, {sensor}: {error}");
             }
@@ -151,7 +164,10 @@ fn every_format_is_read_back() {
     let calibration = calibration_of("SI", false);
     for format in FORMATS {
         if format.noise == Noise::Only {
-            assert_eq!(read_back(format.name, &[], &calibration).format.name, format.name);
+            assert_eq!(
+                read_back(format.name, &[], &calibration).format.name,
+                format.name
+            );
         } else {
             assert!(tried.contains(&format.name), "{}", format.name);
         }
@@ -169,15 +185,28 @@ fn noise_is_read_back_in_the_densities_that_were_written() {
             for term in [Term::N, Term::K] {
                 let Ok(density) = channel.get(term).map(|c| c.value) else {
                     // No place for a walk.
-                    assert!(["ros-imu", "autoware"].contains(&format.name), "{}", format.name);
+                    assert!(
+                        ["ros-imu", "autoware"].contains(&format.name),
+                        "{}",
+                        format.name
+                    );
                     continue;
                 };
-                let of = written.channel.iter().filter(|c| c.name[..4] == channel.name[..4]);
+                let of = written
+                    .channel
+                    .iter()
+                    .filter(|c| c.name[..4] == channel.name[..4]);
                 let values: Vec<f64> = of.map(|c| c.get(term).unwrap().value).collect();
-                let axis = written.channel.iter().find(|c| c.name == channel.name).unwrap();
+                let axis = written
+                    .channel
+                    .iter()
+                    .find(|c| c.name == channel.name)
+                    .unwrap();
                 let own = axis.get(term).unwrap().value;
                 let worst = values.into_iter().fold(0.0, f64::max);
-                let is_one_of = [own, worst].iter().any(|v| (density / v - 1.0).abs() < 0.02);
+                let is_one_of = [own, worst]
+                    .iter()
+                    .any(|v| (density / v - 1.0).abs() < 0.02);
                 assert!(is_one_of, "{}, {}: {density}", format.name, channel.name);
                 assert!(channel.get(term).unwrap().sigma.is_nan());
             }
@@ -193,11 +222,29 @@ fn what_is_missing_is_named_with_its_key() {
         error.map(|e| e.to_string()).unwrap_or_default()
     };
     let said = refused("SM: [1, 0, 0, 0, 1, 0, 0, 0]\nbias: [0, 0, 0]\n");
-    assert!(said.starts_with("cal.yaml, key SM: it is missing, or has fewer numbers than 9"), "{said}");
+    assert!(
+        said.starts_with("cal.yaml, key SM: it is missing, or has fewer numbers than 9"),
+        "{said}"
+    );
     let said = refused("CAL_ACC0_XOFF 0.1\nCAL_ACC0_YOFF 0.1\nCAL_ACC0_ZOFF 0.1\n");
-    assert!(said.starts_with("cal.yaml, key CAL_ACC0_{AXIS}SCALE: it is missing"), "{said}");
-    assert!(foreign::read(b"t,x,y\n1,2,3\n", "log.csv").unwrap().is_none());
-    let noise = foreign::read(b"acc_n: 0.1\ngyr_n: 0.01\n", "vins.yaml").unwrap().unwrap();
+    assert!(
+        said.starts_with("cal.yaml, key CAL_ACC0_{AXIS}SCALE: it is missing"),
+        "{said}"
+    );
+    assert!(
+        foreign::read(b"t,x,y\n1,2,3\n", "log.csv")
+            .unwrap()
+            .is_none()
+    );
+    let noise = foreign::read(b"acc_n: 0.1\ngyr_n: 0.01\n", "vins.yaml")
+        .unwrap()
+        .unwrap();
     assert!(noise.calibration(RawUnit::Si).is_err());
-    assert!(noise.noise(None).unwrap_err().to_string().contains("does not say the rate"));
+    assert!(
+        noise
+            .noise(None)
+            .unwrap_err()
+            .to_string()
+            .contains("does not say the rate")
+    );
 }
