@@ -9,11 +9,10 @@ use std::fmt::Write as _;
 
 use clap::Args;
 use mimu::quantity::{AXES, Sensor};
-use mimu_allan::model::Term;
 use mimu_recording::error::Result;
 
 use crate::convention::{Bias, Convention, Shape};
-use crate::layout::{Entry, NoiseKey, NoiseOf, Numbers};
+use crate::layout::{Entry, NoiseKey, NoiseOf, Numbers, white};
 use crate::remaining::{Places, Remaining};
 use crate::worst_axis::NoiseOptions;
 use crate::{Export, Noise, Sources, Target, driver, yaml};
@@ -47,15 +46,13 @@ impl Target for Autoware {
         "angular_velocity_offset_{axis}",
     )];
     const NOISE_KEYS: &[NoiseKey] = &[
-        NoiseKey::density(
+        white(
             "angular_velocity_stddev_{axis}{axis}",
             "rad/s",
             Sensor::Gyro,
-            Term::N,
         )
         .of(NoiseOf::Deviation),
-        NoiseKey::density("acceleration_stddev", "m/s^2", Sensor::Accel, Term::N)
-            .of(NoiseOf::Deviation),
+        white("acceleration_stddev", "m/s^2", Sensor::Accel).of(NoiseOf::Deviation),
     ];
 
     /// # Errors

@@ -10,7 +10,6 @@
 
 use clap::Args;
 use mimu::quantity::{PerSensor, Sensor};
-use mimu_allan::model::Term;
 use mimu_core::compensation::Affine;
 use mimu_recording::error::{Error, Result};
 use nalgebra::Matrix3;
@@ -18,7 +17,7 @@ use serde::Serialize;
 
 use crate::convention::{Bias, Convention, Factors, Shape, Triangle};
 use crate::driver::{self, Readings};
-use crate::layout::{Entry, NoiseKey, Numbers};
+use crate::layout::{Entry, NoiseKey, Numbers, walk, white};
 use crate::remaining::Places;
 use crate::worst_axis::{Densities, NoiseOptions};
 use crate::{Export, Page, Sources, Target, heading};
@@ -74,10 +73,10 @@ impl Target for Basalt {
         Entry::of(Sensor::Gyro, Numbers::BiasThenLeft, "calib_gyro_bias").scaled(1.0, 1.0),
     ];
     const NOISE_KEYS: &[NoiseKey] = &[
-        NoiseKey::density("accel_noise_std", "", Sensor::Accel, Term::N),
-        NoiseKey::density("gyro_noise_std", "", Sensor::Gyro, Term::N),
-        NoiseKey::density("accel_bias_std", "", Sensor::Accel, Term::K),
-        NoiseKey::density("gyro_bias_std", "", Sensor::Gyro, Term::K),
+        white("accel_noise_std", "", Sensor::Accel),
+        white("gyro_noise_std", "", Sensor::Gyro),
+        walk("accel_bias_std", "", Sensor::Accel),
+        walk("gyro_bias_std", "", Sensor::Gyro),
     ];
     const RATE_KEY: Option<&str> = Some("imu_update_rate");
     const PAGES: &[Page] = &[Page::of("Basalt", "basalt_imu.json")];

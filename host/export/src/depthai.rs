@@ -9,13 +9,12 @@
 
 use clap::Args;
 use mimu::quantity::{AXES, PerSensor, Sensor};
-use mimu_allan::model::Term;
 use mimu_recording::error::Result;
 use serde_json::{Map, Value, json};
 
 use crate::convention::{Bias, Convention, Shape};
 use crate::driver::Readings;
-use crate::layout::{Entry, NoiseKey, Numbers};
+use crate::layout::{Entry, NoiseKey, Numbers, walk, white};
 use crate::remaining::Places;
 use crate::worst_axis::{self, WalkOptions};
 use crate::{Export, Noise, Page, Sources, Target, driver, heading};
@@ -58,30 +57,10 @@ impl Target for DepthAi {
         ),
     ];
     const NOISE_KEYS: &[NoiseKey] = &[
-        NoiseKey::density(
-            "noise/accelerometer/{axis}/noiseDensity",
-            "",
-            Sensor::Accel,
-            Term::N,
-        ),
-        NoiseKey::density(
-            "noise/accelerometer/{axis}/randomWalk",
-            "",
-            Sensor::Accel,
-            Term::K,
-        ),
-        NoiseKey::density(
-            "noise/gyroscope/{axis}/noiseDensity",
-            "",
-            Sensor::Gyro,
-            Term::N,
-        ),
-        NoiseKey::density(
-            "noise/gyroscope/{axis}/randomWalk",
-            "",
-            Sensor::Gyro,
-            Term::K,
-        ),
+        white("noise/accelerometer/{axis}/noiseDensity", "", Sensor::Accel),
+        walk("noise/accelerometer/{axis}/randomWalk", "", Sensor::Accel),
+        white("noise/gyroscope/{axis}/noiseDensity", "", Sensor::Gyro),
+        walk("noise/gyroscope/{axis}/randomWalk", "", Sensor::Gyro),
     ];
     const PAGES: &[Page] = &[Page::of("OAK cameras (DepthAI)", "imu.json")];
 

@@ -9,13 +9,10 @@ use std::fmt::Write as _;
 use mimu::quantity::Sensor;
 use mimu_recording::error::Result;
 
-use crate::convention::{Bias, Convention, Shape};
+use crate::convention::{Bias, Convention, Parts, Shape};
 use crate::layout::{Entry, Numbers};
 use crate::remaining::{Places, Remaining};
-use crate::{Export, Page, Sources, Target, driver, yaml};
-
-/// How the gyro is read: its matrix is not there.
-const GYRO: Convention = Convention::to_input(Shape::Absent, Bias::SubtractedFromInput);
+use crate::{Export, Page, Sources, Target, driver, layout, yaml};
 
 /// The format.
 pub struct Dlio;
@@ -50,14 +47,11 @@ impl Target for Dlio {
         let error = Remaining::of_readings(Sensor::Gyro, &gyro.matrix);
         export.remaining.push(error);
         let accel = Self::CONVENTION.of(&readings.accel)?;
-        let gyro = driver::Readings {
-            inverse: mimu_core::compensation::Affine {
-                matrix: nalgebra::Matrix3::identity(),
-                offset: -gyro.bias,
-            },
-            ..readings.gyro
+        // Whose matrix is the identity, so that its bias is that of the readings.
+        let gyro = Parts {
+            bias: gyro.bias,
+            ..layout::nothing()
         };
-        let gyro = GYRO.of(&gyro)?;
         let mut out =
             export.head("#", from) + "dlio:\n  imu:\n    calibration: false\n    intrinsics:\n";
         for entry in Self::LAYOUT {

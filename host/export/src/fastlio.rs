@@ -7,10 +7,9 @@
 
 use clap::Args;
 use mimu::quantity::Sensor::{Accel, Gyro};
-use mimu_allan::model::Term::{K, N};
 use mimu_recording::error::Result;
 
-use crate::layout::{NoiseKey, NoiseOf};
+use crate::layout::{NoiseKey, NoiseOf, walk, white};
 use crate::worst_axis::{NoiseOptions, keys_file};
 use crate::{Export, Noise, Page, Sources, Target, noise_interval};
 
@@ -36,10 +35,10 @@ impl Target for FastLio {
     const READERS: &str = "FAST-LIO (`--ros2` likewise)";
     const NOISE: Noise = Noise::Only;
     const NOISE_KEYS: &[NoiseKey] = &[
-        NoiseKey::density("acc_cov", "(m/s^2)^2", Accel, N).of(NoiseOf::Variance),
-        NoiseKey::density("gyr_cov", "(rad/s)^2", Gyro, N).of(NoiseOf::Variance),
-        NoiseKey::density("b_acc_cov", "(m/s^3)^2", Accel, K).of(NoiseOf::Variance),
-        NoiseKey::density("b_gyr_cov", "(rad/s^2)^2", Gyro, K).of(NoiseOf::Variance),
+        white("acc_cov", "(m/s^2)^2", Accel).of(NoiseOf::Variance),
+        white("gyr_cov", "(rad/s)^2", Gyro).of(NoiseOf::Variance),
+        walk("b_acc_cov", "(m/s^3)^2", Accel).of(NoiseOf::Variance),
+        walk("b_gyr_cov", "(rad/s^2)^2", Gyro).of(NoiseOf::Variance),
     ];
     const PAGES: &[Page] = &[Page::of("FAST-LIO", "fastlio.yaml")];
 

@@ -155,10 +155,15 @@ impl Foreign {
             let remedy = "give a file with scale factors or biases";
             return Err(Error::new(&self.place, problem, remedy).about(Argument::Calibration));
         }
-        let models = self.parts.as_ref().map(|parts| {
-            let parts = parts.as_ref()?;
-            self.format.convention.inverse(parts)
-        });
+        let mut models = PerSensor::default();
+        for (sensor, parts) in self.parts.present() {
+            let model = self.format.convention.inverse(parts).ok_or_else(|| {
+                let place = format!("{}, {sensor}", self.place);
+                let remedy = "check the numbers of the file";
+                Error::new(place, "its matrix is singular", remedy)
+            })?;
+            models[sensor] = Some(model);
+        }
         self.with(&models, given)
     }
 
@@ -168,13 +173,6 @@ impl Foreign {
         models: &PerSensor<Option<Affine<f64>>>,
         given: RawUnit,
     ) -> Result<Calibration> {
-        for (sensor, _) in self.parts.present() {
-            if models[sensor].is_none() {
-                let place = format!("{}, {sensor}", self.place);
-                let remedy = "check the numbers of the file";
-                return Err(Error::new(place, "its matrix is singular", remedy));
-            }
-        }
         let frame = format!("that of {}", self.format.name);
         let unit = (UNNAMED, self.raw_unit(given), frame.as_str());
         Calibration::of_program(models, unit, &self.place)
@@ -221,34 +219,22 @@ impl Foreign {
                 channel.push(NoiseChannel {
                     name: format!("{sensor}_{axis}"),
                     unit: sensor.unit().into(),
-                    raw_unit: None,
-                    scale_factor: None,
-                    samples: 0,
-                    temp_c: None,
-                    q: None,
                     n: Some(unknown(white[i], sensor.unit())),
-                    b: None,
                     k: walk.map(|walk| unknown(walk[i], sensor.unit())),
-                    r: None,
-                    q_reason: None,
-                    n_reason: None,
-                    b_reason: None,
                     k_reason: Some(format!("{} has no random walk", self.place)),
-                    r_reason: None,
-                    k_at_most: None,
+                    ..NoiseChannel::default()
                 });
             }
         }
         Ok((!channel.is_empty()).then(|| NoiseFile {
             format: NOISE_FORMAT.into(),
             device: UNNAMED.into(),
-            created: None,
-            judgement: None,
             sample_rate_hz: rate_hz.unwrap_or(f64::NAN),
             duration_s: f64::NAN,
             confidence: f64::NAN,
             channel,
             place: self.place.clone(),
+            ..NoiseFile::default()
         }))
     }
 }

@@ -43,9 +43,9 @@ pub(crate) fn keys<T: Target>(
     export.needs_calibrated(from);
     let numbers = |key: &'static NoiseKey| {
         let density = |axis: &Densities| axis.of(key.term).value;
-        let scale = match key.is_gauss_markov() {
-            true => factor * options.correlation_time.sqrt(),
-            false => 1.0,
+        let scale = match key.correlation {
+            Some(_) => factor * options.correlation_time.sqrt(),
+            None => 1.0,
         };
         let values = axes[key.sensor].each_ref().map(|axis| {
             let number = key.number(scale * density(axis), f64::NAN);

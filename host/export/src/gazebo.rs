@@ -11,13 +11,12 @@ use std::fmt::Write as _;
 
 use clap::Args;
 use mimu::quantity::{AXES, PerSensor, Sensor};
-use mimu_allan::model::Term;
 use mimu_recording::error::Result;
 use nalgebra::Vector3;
 
 use crate::convention::{Bias, Convention, Shape};
 use crate::driver::{self, Readings, positive};
-use crate::layout::{Entry, NoiseKey, NoiseOf, Numbers};
+use crate::layout::{Entry, NoiseKey, NoiseOf, Numbers, walk, white};
 use crate::remaining::{Places, Remaining};
 use crate::worst_axis::NoiseOptions;
 use crate::{Export, Noise, Page, Sources, Target, yaml};
@@ -60,31 +59,17 @@ impl Target for Gazebo {
         ),
     ];
     const NOISE_KEYS: &[NoiseKey] = &[
-        NoiseKey::density(
-            "angular_velocity/{axis}/noise/stddev",
-            "",
-            Sensor::Gyro,
-            Term::N,
-        )
-        .of(NoiseOf::Deviation),
-        NoiseKey::density(
-            "linear_acceleration/{axis}/noise/stddev",
-            "",
-            Sensor::Accel,
-            Term::N,
-        )
-        .of(NoiseOf::Deviation),
-        NoiseKey::density(
+        white("angular_velocity/{axis}/noise/stddev", "", Sensor::Gyro).of(NoiseOf::Deviation),
+        white("linear_acceleration/{axis}/noise/stddev", "", Sensor::Accel).of(NoiseOf::Deviation),
+        walk(
             "angular_velocity/{axis}/noise/dynamic_bias_stddev",
             "",
             Sensor::Gyro,
-            Term::K,
         ),
-        NoiseKey::density(
+        walk(
             "linear_acceleration/{axis}/noise/dynamic_bias_stddev",
             "",
             Sensor::Accel,
-            Term::K,
         ),
     ];
     const PAGES: &[Page] = &[Page::of("Gazebo", "imu.sdf")];

@@ -21,14 +21,13 @@ use std::fmt::Write as _;
 
 use clap::Args;
 use mimu::quantity::{PerSensor, Sensor};
-use mimu_allan::model::Term;
 use mimu_recording::error::Result;
 use nalgebra::{Matrix3, Matrix4};
 
 use crate::convention::{Bias, Convention, Factors, Shape, Triangle};
 use crate::driver::Readings;
 use crate::intrinsics::Intrinsics;
-use crate::layout::{Entry, NoiseKey, Numbers};
+use crate::layout::{Entry, NoiseKey, Numbers, walk, white};
 use crate::worst_axis::{NoiseOptions, lines};
 use crate::{Export, Noise, Page, Sources, Target, driver, yaml};
 
@@ -104,12 +103,15 @@ impl Target for Kalibr {
 }
 
 /// The noise keys that Kalibr and OpenVINS share.
-#[rustfmt::skip]
 pub(crate) const KEYS: [NoiseKey; 4] = [
-    NoiseKey::density("accelerometer_noise_density", "m/s^2/sqrt(Hz)", Sensor::Accel, Term::N),
-    NoiseKey::density("accelerometer_random_walk", "m/s^3/sqrt(Hz)", Sensor::Accel, Term::K),
-    NoiseKey::density("gyroscope_noise_density", "rad/s/sqrt(Hz)", Sensor::Gyro, Term::N),
-    NoiseKey::density("gyroscope_random_walk", "rad/s^2/sqrt(Hz)", Sensor::Gyro, Term::K),
+    white(
+        "accelerometer_noise_density",
+        "m/s^2/sqrt(Hz)",
+        Sensor::Accel,
+    ),
+    walk("accelerometer_random_walk", "m/s^3/sqrt(Hz)", Sensor::Accel),
+    white("gyroscope_noise_density", "rad/s/sqrt(Hz)", Sensor::Gyro),
+    walk("gyroscope_random_walk", "rad/s^2/sqrt(Hz)", Sensor::Gyro),
 ];
 
 impl Kalibr {

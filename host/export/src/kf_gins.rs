@@ -7,11 +7,10 @@
 use std::fmt::Write as _;
 
 use mimu::quantity::Sensor::{Accel, Gyro};
-use mimu_allan::model::Term::{K, N};
 use mimu_recording::error::Result;
 
 use crate::gauss_markov::{Options, keys};
-use crate::layout::NoiseKey;
+use crate::layout::{NoiseKey, walk, white};
 use crate::{Export, Noise, Page, Sources, Target};
 
 /// deg/√h, and deg/h, in SI.
@@ -28,12 +27,12 @@ impl Target for KfGins {
     const READERS: &str = "KF-GINS";
     const NOISE: Noise = Noise::Only;
     const NOISE_KEYS: &[NoiseKey] = &[
-        NoiseKey::density("imunoise/arw", "deg/sqrt(hr)", Gyro, N).in_si(DEG / 60.0),
-        NoiseKey::density("imunoise/vrw", "m/s/sqrt(hr)", Accel, N).in_si(1.0 / 60.0),
-        NoiseKey::density("imunoise/gbstd", "deg/hr", Gyro, K)
+        white("imunoise/arw", "deg/sqrt(hr)", Gyro).in_si(DEG / 60.0),
+        white("imunoise/vrw", "m/s/sqrt(hr)", Accel).in_si(1.0 / 60.0),
+        walk("imunoise/gbstd", "deg/hr", Gyro)
             .in_si(DEG / 3600.0)
             .gauss_markov("imunoise/corrtime", 3600.0 / 2.0),
-        NoiseKey::density("imunoise/abstd", "mGal", Accel, K)
+        walk("imunoise/abstd", "mGal", Accel)
             .in_si(1e-5)
             .gauss_markov("imunoise/corrtime", 3600.0 / 2.0),
     ];

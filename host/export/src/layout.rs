@@ -256,26 +256,29 @@ pub struct NoiseKey {
     pub correlation: Option<(&'static str, f64)>,
 }
 
-impl NoiseKey {
-    /// A density in SI.
-    pub const fn density(
-        key: &'static str,
-        unit: &'static str,
-        sensor: Sensor,
-        term: Term,
-    ) -> Self {
-        let of = NoiseOf::Density;
-        Self {
-            key,
-            unit,
-            sensor,
-            term,
-            of,
-            si: 1.0,
-            correlation: None,
-        }
+/// The key of N, a density in SI.
+pub const fn white(key: &'static str, unit: &'static str, sensor: Sensor) -> NoiseKey {
+    NoiseKey {
+        key,
+        unit,
+        sensor,
+        term: Term::N,
+        of: NoiseOf::Density,
+        si: 1.0,
+        correlation: None,
     }
+}
 
+/// The key of K, likewise.
+pub const fn walk(key: &'static str, unit: &'static str, sensor: Sensor) -> NoiseKey {
+    let term = Term::K;
+    NoiseKey {
+        term,
+        ..white(key, unit, sensor)
+    }
+}
+
+impl NoiseKey {
     /// The same key with another number.
     pub const fn of(self, of: NoiseOf) -> Self {
         Self { of, ..self }
@@ -292,11 +295,6 @@ impl NoiseKey {
             correlation: Some((key, seconds)),
             ..self
         }
-    }
-
-    /// Whether it is the standard deviation of a Gauss-Markov process.
-    pub fn is_gauss_markov(&self) -> bool {
-        self.correlation.is_some()
     }
 
     /// The number of the file.

@@ -6,10 +6,9 @@
 
 use clap::Args;
 use mimu::quantity::Sensor::{Accel, Gyro};
-use mimu_allan::model::Term::{K, N};
 use mimu_recording::error::Result;
 
-use crate::layout::NoiseKey;
+use crate::layout::{NoiseKey, walk, white};
 use crate::worst_axis::{GravityOptions, WalkOptions, keys_file};
 use crate::{Export, Noise, Page, Sources, Target};
 
@@ -38,10 +37,10 @@ impl Target for LioSam {
     const READERS: &str = "LIO-SAM (`--ros2` for its branch for ROS 2)";
     const NOISE: Noise = Noise::Only;
     const NOISE_KEYS: &[NoiseKey] = &[
-        NoiseKey::density("imuAccNoise", "m/s^2/sqrt(Hz)", Accel, N),
-        NoiseKey::density("imuGyrNoise", "rad/s/sqrt(Hz)", Gyro, N),
-        NoiseKey::density("imuAccBiasN", "m/s^3/sqrt(Hz)", Accel, K),
-        NoiseKey::density("imuGyrBiasN", "rad/s^2/sqrt(Hz)", Gyro, K),
+        white("imuAccNoise", "m/s^2/sqrt(Hz)", Accel),
+        white("imuGyrNoise", "rad/s/sqrt(Hz)", Gyro),
+        walk("imuAccBiasN", "m/s^3/sqrt(Hz)", Accel),
+        walk("imuGyrBiasN", "rad/s^2/sqrt(Hz)", Gyro),
     ];
     const PAGES: &[Page] = &[Page::of("LIO-SAM", "liosam.yaml")];
 

@@ -15,13 +15,12 @@ use std::f64::consts::{FRAC_1_SQRT_2 as ROOT_HALF, SQRT_2};
 
 use clap::Args;
 use mimu::quantity::Sensor;
-use mimu_allan::model::Term;
 use mimu_recording::error::Result;
 use serde_json::{Value, json};
 
 use crate::convention::{Bias, Convention, Shape};
 use crate::driver::{self, Readings};
-use crate::layout::{Entry, NoiseKey, Numbers};
+use crate::layout::{Entry, NoiseKey, Numbers, walk, white};
 use crate::remaining::Places;
 use crate::worst_axis::{Densities, WalkOptions};
 use crate::{Export, Noise, Page, Sources, Target, heading};
@@ -76,11 +75,10 @@ impl Target for Matlab {
         Entry::of(Sensor::Gyro, Numbers::Bias, "Gyroscope/ConstantBias"),
     ];
     const NOISE_KEYS: &[NoiseKey] = &[
-        NoiseKey::density("Accelerometer/NoiseDensity", "", Sensor::Accel, Term::N)
-            .in_si(ROOT_HALF),
-        NoiseKey::density("Accelerometer/RandomWalk", "", Sensor::Accel, Term::K).in_si(SQRT_2),
-        NoiseKey::density("Gyroscope/NoiseDensity", "", Sensor::Gyro, Term::N).in_si(ROOT_HALF),
-        NoiseKey::density("Gyroscope/RandomWalk", "", Sensor::Gyro, Term::K).in_si(SQRT_2),
+        white("Accelerometer/NoiseDensity", "", Sensor::Accel).in_si(ROOT_HALF),
+        walk("Accelerometer/RandomWalk", "", Sensor::Accel).in_si(SQRT_2),
+        white("Gyroscope/NoiseDensity", "", Sensor::Gyro).in_si(ROOT_HALF),
+        walk("Gyroscope/RandomWalk", "", Sensor::Gyro).in_si(SQRT_2),
     ];
     const PAGES: &[Page] = &[Page::of("MATLAB imuSensor", "unit.json")];
 

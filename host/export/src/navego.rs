@@ -8,11 +8,10 @@ use std::fmt::Write as _;
 
 use mimu::quantity::Sensor::{Accel, Gyro};
 use mimu::readable::STANDARD_GRAVITY;
-use mimu_allan::model::Term::{K, N};
 use mimu_recording::error::Result;
 
 use crate::gauss_markov::{Options, keys};
-use crate::layout::NoiseKey;
+use crate::layout::{NoiseKey, walk, white};
 use crate::{Export, Noise, Page, Sources, Target};
 
 /// deg/√h, and deg/s, in SI.
@@ -29,12 +28,12 @@ impl Target for NaveGo {
     const READERS: &str = "NaveGo, in MATLAB and Octave";
     const NOISE: Noise = Noise::Only;
     const NOISE_KEYS: &[NoiseKey] = &[
-        NoiseKey::density("imu/arw", "deg/root(hour)", Gyro, N).in_si(DEG / 60.0),
-        NoiseKey::density("imu/vrw", "m/s/root(hour)", Accel, N).in_si(1.0 / 60.0),
-        NoiseKey::density("imu/gb_dyn", "deg/s", Gyro, K)
+        white("imu/arw", "deg/root(hour)", Gyro).in_si(DEG / 60.0),
+        white("imu/vrw", "m/s/root(hour)", Accel).in_si(1.0 / 60.0),
+        walk("imu/gb_dyn", "deg/s", Gyro)
             .in_si(DEG)
             .gauss_markov("imu/gb_corr", 1.0),
-        NoiseKey::density("imu/ab_dyn", "mg", Accel, K)
+        walk("imu/ab_dyn", "mg", Accel)
             .in_si(1e-3 * STANDARD_GRAVITY)
             .gauss_markov("imu/ab_corr", 1.0),
     ];

@@ -5,10 +5,9 @@
 //! `IntegrateNewMeasurement`. The reader of settings without `File.version` accepts an integer for the frequency, and only reals for the others.
 
 use mimu::quantity::Sensor::{Accel, Gyro};
-use mimu_allan::model::Term::{K, N};
 use mimu_recording::error::Result;
 
-use crate::layout::NoiseKey;
+use crate::layout::{NoiseKey, walk, white};
 use crate::worst_axis::{NoiseOptions, keys_file};
 use crate::{Export, Noise, Page, Sources, Target};
 
@@ -23,10 +22,10 @@ impl Target for OrbSlam3 {
     const READERS: &str = "ORB-SLAM3";
     const NOISE: Noise = Noise::Only;
     const NOISE_KEYS: &[NoiseKey] = &[
-        NoiseKey::density("IMU.NoiseGyro", "rad/s/sqrt(Hz)", Gyro, N),
-        NoiseKey::density("IMU.NoiseAcc", "m/s^2/sqrt(Hz)", Accel, N),
-        NoiseKey::density("IMU.GyroWalk", "rad/s^2/sqrt(Hz)", Gyro, K),
-        NoiseKey::density("IMU.AccWalk", "m/s^3/sqrt(Hz)", Accel, K),
+        white("IMU.NoiseGyro", "rad/s/sqrt(Hz)", Gyro),
+        white("IMU.NoiseAcc", "m/s^2/sqrt(Hz)", Accel),
+        walk("IMU.GyroWalk", "rad/s^2/sqrt(Hz)", Gyro),
+        walk("IMU.AccWalk", "m/s^3/sqrt(Hz)", Accel),
     ];
     const RATE_KEY: Option<&str> = Some("IMU.Frequency");
     const PAGES: &[Page] = &[Page::of("ORB-SLAM3", "orbslam3.yaml")];

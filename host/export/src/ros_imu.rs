@@ -5,10 +5,9 @@
 //! ros2/common_interfaces, sensor_msgs/msg/Imu.msg.
 
 use mimu::quantity::{PerSensor, Sensor};
-use mimu_allan::model::Term;
 use mimu_recording::error::Result;
 
-use crate::layout::{NoiseKey, NoiseOf};
+use crate::layout::{NoiseKey, NoiseOf, white};
 use crate::worst_axis::NoiseOptions;
 use crate::{Export, Noise, Page, Sources, Target, yaml};
 
@@ -23,10 +22,8 @@ impl Target for RosImu {
     const READERS: &str = "nodes that publish `sensor_msgs/Imu`";
     const NOISE: Noise = Noise::Only;
     const NOISE_KEYS: &[NoiseKey] = &[
-        NoiseKey::density("angular_velocity_covariance", "", Sensor::Gyro, Term::N)
-            .of(NoiseOf::Variance),
-        NoiseKey::density("linear_acceleration_covariance", "", Sensor::Accel, Term::N)
-            .of(NoiseOf::Variance),
+        white("angular_velocity_covariance", "", Sensor::Gyro).of(NoiseOf::Variance),
+        white("linear_acceleration_covariance", "", Sensor::Accel).of(NoiseOf::Variance),
     ];
     const PAGES: &[Page] = &[Page::of("ROS, sensor_msgs/Imu", "covariances.yaml")];
 

@@ -13,10 +13,9 @@
 
 use clap::Args;
 use mimu::quantity::Sensor::{Accel, Gyro};
-use mimu_allan::model::Term::{K, N};
 use mimu_recording::error::Result;
 
-use crate::layout::{NoiseKey, NoiseOf};
+use crate::layout::{NoiseKey, NoiseOf, walk, white};
 use crate::worst_axis::{GravityOptions, NoiseOptions, keys_file};
 use crate::{Export, Noise, Page, Sources, Target, noise_interval};
 
@@ -42,10 +41,10 @@ impl Target for Vins {
     const READERS: &str = "VINS-Fusion, VINS-Mono";
     const NOISE: Noise = Noise::Only;
     const NOISE_KEYS: &[NoiseKey] = &[
-        NoiseKey::density("acc_n", "m/s^2", Accel, N).of(NoiseOf::Deviation),
-        NoiseKey::density("gyr_n", "rad/s", Gyro, N).of(NoiseOf::Deviation),
-        NoiseKey::density("acc_w", "m/s^3", Accel, K).of(NoiseOf::Deviation),
-        NoiseKey::density("gyr_w", "rad/s^2", Gyro, K).of(NoiseOf::Deviation),
+        white("acc_n", "m/s^2", Accel).of(NoiseOf::Deviation),
+        white("gyr_n", "rad/s", Gyro).of(NoiseOf::Deviation),
+        walk("acc_w", "m/s^3", Accel).of(NoiseOf::Deviation),
+        walk("gyr_w", "rad/s^2", Gyro).of(NoiseOf::Deviation),
     ];
     const PAGES: &[Page] = &[Page::of("VINS-Fusion", "vins.yaml")];
 

@@ -30,7 +30,7 @@ pub struct ConvertArgs {
     #[arg(short = 'o', long = "out", value_name = "FILE")]
     out: PathBuf,
     /// Unit of the readings that the file is for, if it does not say it: V, count or SI
-    #[arg(long, default_value = "count", value_parser = raw_unit)]
+    #[arg(long, default_value = "count")]
     raw_unit: RawUnit,
     /// Messages a second that the file's noise is of, if it does not say them
     #[arg(long, value_name = "HZ")]
@@ -45,12 +45,6 @@ pub struct ConvertArgs {
 fn names() -> PossibleValuesParser {
     let formats = FORMATS.iter().map(|format| format.name);
     PossibleValuesParser::new(formats.chain([OWN]))
-}
-
-fn raw_unit(text: &str) -> std::result::Result<RawUnit, String> {
-    let mut all = [RawUnit::Volt, RawUnit::Count, RawUnit::Si].into_iter();
-    let found = all.find(|unit| unit.to_string() == text);
-    found.ok_or_else(|| "it is one of V, count and SI".into())
 }
 
 pub fn run(args: &ConvertArgs) -> Result<()> {

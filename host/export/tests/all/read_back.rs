@@ -40,7 +40,7 @@ const CASES: [(&str, &[&str], &str, [Kept; 2], f64); 24] = [
     ("c", &[], "count", [Whole, Whole], 1e-6),
     ("rust", &[], "count", [Whole, Whole], 1e-6),
     ("core", &[], "count", [Whole, Whole], 1e-6),
-    ("json", &[], "SI", [Whole, Whole], 1e-15),
+    ("json", &[], "SI", [Whole, Whole], 1e-14),
     ("kalibr", &[], "SI", [RotatedMatrix, RotatedMatrix], 1e-8),
     ("kalibr", &["--result"], "SI", [RotatedMatrix, RotatedMatrix], 1e-8),
     ("openvins", &[], "SI", [Matrix, Matrix], 1e-8),
