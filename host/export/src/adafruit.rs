@@ -17,7 +17,7 @@ use serde_json::{Map, Value, json};
 
 use crate::convention::{Bias, Convention, Shape};
 use crate::layout::{Entry, Numbers};
-use crate::remaining::{self, Places};
+use crate::remaining::Places;
 use crate::{Export, Page, Sources, Target, body, driver};
 
 /// How a magnetometer is written.
@@ -82,26 +82,12 @@ impl Target for Adafruit {
                 .into_iter()
                 .flatten(),
         );
-        for entry in Self::LAYOUT {
+        let missing = "nothing is written for it";
+        for (entry, parts) in options.driver.biases::<Self>(from, missing, &mut export)? {
             let (sensor, name) = (entry.sensor, entry.key);
-            if calibration.table(sensor).is_none() {
-                export.note(format!(
-                    "The calibration has no {sensor}, so nothing is written for it."
-                ));
-                continue;
-            }
-            let readings = options.driver.readings(calibration, place, sensor)?;
-            export.formula(format!(
-                "{sensor}: output = reading - {name}, {}",
-                sensor.unit()
-            ));
-            export.note(readings.line());
-            let gain = readings.forward.matrix.diagonal();
-            export
-                .remaining
-                .push(remaining::scale_factors(sensor, &gain));
-            let values = entry.values(&Self::CONVENTION.of(&readings)?);
-            all.push((name, sensor.unit(), values));
+            let unit = sensor.unit();
+            export.formula(format!("{sensor}: output = reading - {name}, {unit}"));
+            all.push((name, unit, entry.values(&parts)));
         }
         export.temperature(calibration);
         if options.layout == Layout::Json {

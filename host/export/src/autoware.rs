@@ -7,32 +7,20 @@
 
 use std::fmt::Write as _;
 
-use clap::Args;
 use mimu::quantity::{AXES, Sensor};
 use mimu_recording::error::Result;
 
 use crate::convention::{Bias, Convention, Shape};
 use crate::layout::{Entry, NoiseKey, NoiseOf, Numbers, white};
 use crate::remaining::{Places, Remaining};
-use crate::worst_axis::NoiseOptions;
+use crate::worst_axis::NoiseAndDriver;
 use crate::{Export, Noise, Sources, Target, driver, yaml};
-
-/// Options of the file.
-#[derive(Debug, Clone, Default, Args)]
-pub struct Options {
-    /// Options common to all noise files.
-    #[command(flatten)]
-    pub noise: NoiseOptions,
-    /// The driver's conversion.
-    #[command(flatten)]
-    pub driver: driver::Options,
-}
 
 /// The format.
 pub struct Autoware;
 
 impl Target for Autoware {
-    type Options = Options;
+    type Options = NoiseAndDriver;
     const NAME: &str = "autoware";
     const ABOUT: &str = "Biases of the gyro and noise for Autoware: imu_corrector.param.yaml";
     const CONTENTS: &str = "bias of the gyro, noise";
@@ -57,7 +45,7 @@ impl Target for Autoware {
 
     /// # Errors
     /// The calibration, a triad of it or the noise is missing, C is singular, or an error of [`crate::worst_axis::WalkOptions::axes`].
-    fn export(from: &Sources, options: &Options) -> Result<Export> {
+    fn export(from: &Sources, options: &NoiseAndDriver) -> Result<Export> {
         from.calibration()?;
         let noise = from.noise()?;
         let (calibration, readings) = options.driver.both(from)?;

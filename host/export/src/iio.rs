@@ -18,7 +18,7 @@ use mimu_recording::error::{Argument, Result};
 
 use crate::convention::{Bias, Convention, Shape, within};
 use crate::layout::{Entry, Numbers};
-use crate::remaining::{self, Places, Remaining};
+use crate::remaining::{Places, Remaining};
 use crate::{Export, Page, Sources, Target, driver};
 
 /// One step of the registers, SI.
@@ -66,34 +66,22 @@ impl Target for Iio {
     /// # Errors
     /// The calibration is missing, C is singular, or a bias is beyond the range of the chip.
     fn export(from: &Sources, options: &driver::Options) -> Result<Export> {
-        let (calibration, place) = from.calibration()?;
+        let (calibration, _) = from.calibration()?;
         let mut export = Export::new::<Self>(from);
         export.formula("output = scale * raw + calibbias on each axis of the chip, SI; the chip adds calibbias");
         export.leaves(calibration, Places::Axes);
         let mut body = String::new();
-        for entry in Self::LAYOUT {
+        let missing = "its calibbias stays as it is";
+        for (entry, parts) in options.biases::<Self>(from, missing, &mut export)? {
             let sensor = entry.sensor;
             let argument = match sensor {
                 Sensor::Gyro => Argument::GyroZero,
                 Sensor::Accel => Argument::AccelZero,
             };
-            if calibration.table(sensor).is_none() {
-                export.note(format!(
-                    "The calibration has no {sensor}, so its calibbias stays as it is."
-                ));
-                continue;
-            }
-            let readings = options.readings(calibration, place, sensor)?;
-            export.note(readings.line());
-            let gain = readings.forward.matrix.diagonal();
-            export
-                .remaining
-                .push(remaining::scale_factors(sensor, &gain));
-            export
-                .remaining
-                .push(Remaining::of_rounding(sensor, STEP[sensor]));
+            let rounding = Remaining::of_rounding(sensor, STEP[sensor]);
+            export.remaining.push(rounding);
             let _ = writeln!(body, "find_device \"${{1:-i[ci]m4*}}-{sensor}\"");
-            let keys = entry.written(&Self::CONVENTION.of(&readings)?);
+            let keys = entry.written(&parts);
             for (i, (name, bias)) in keys.iter().enumerate() {
                 let (most, unit) = (MOST * STEP[sensor], format!(" {}", sensor.unit()));
                 let remedy = ("give the zero of the readings", argument);

@@ -118,16 +118,23 @@ impl Entry {
 
     /// The numbers of the file.
     pub fn values(&self, parts: &Parts) -> Vec<f64> {
-        let of_matrix = |m: &Matrix3<f64>, i, j| match i == j {
-            true => (m[(i, j)] - self.from) / self.unit,
-            false => m[(i, j)] / self.unit,
-        };
-        let value = |slot| match slot {
-            Slot::Left(i, j) => of_matrix(&parts.left, i, j),
-            Slot::Right(i, j) => of_matrix(&parts.right, i, j),
-            Slot::Bias(i) => parts.bias[i] / self.unit,
+        let mut parts = *parts;
+        let value = |slot| {
+            let (place, from) = self.place(&mut parts, slot);
+            (*place - from) / self.unit
         };
         self.numbers.slots().into_iter().map(value).collect()
+    }
+
+    /// Where the number of a slot is, and how much a 0 of the file is there.
+    fn place<'a>(&self, parts: &'a mut Parts, slot: Slot) -> (&'a mut f64, f64) {
+        match slot {
+            Slot::Left(i, j) if i == j => (&mut parts.left[(i, j)], self.from),
+            Slot::Right(i, j) if i == j => (&mut parts.right[(i, j)], self.from),
+            Slot::Left(i, j) => (&mut parts.left[(i, j)], 0.0),
+            Slot::Right(i, j) => (&mut parts.right[(i, j)], 0.0),
+            Slot::Bias(i) => (&mut parts.bias[i], 0.0),
+        }
     }
 
     /// The keys of the file, each with its numbers.
@@ -152,12 +159,8 @@ impl Entry {
             return Ok(false);
         };
         for (slot, value) in slots.into_iter().zip(values) {
-            let (place, from) = match slot {
-                Slot::Left(i, j) => (&mut parts.left[(i, j)], (i == j, self.from)),
-                Slot::Right(i, j) => (&mut parts.right[(i, j)], (i == j, self.from)),
-                Slot::Bias(i) => (&mut parts.bias[i], (false, 0.0)),
-            };
-            *place = value * self.unit + if from.0 { from.1 } else { 0.0 };
+            let (place, from) = self.place(parts, slot);
+            *place = value * self.unit + from;
         }
         Ok(true)
     }

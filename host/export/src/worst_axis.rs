@@ -13,7 +13,7 @@ use mimu::readable::STANDARD_GRAVITY;
 use mimu_allan::model::Term;
 use mimu_recording::error::{Argument, Error, Result};
 
-use crate::driver::positive;
+use crate::driver::{self, positive};
 use crate::layout::NoiseKey;
 use crate::{Export, Sources, Target, yaml};
 
@@ -37,6 +37,17 @@ pub struct NoiseOptions {
     /// Random walks.
     #[command(flatten)]
     pub walks: WalkOptions,
+}
+
+/// Options of programs that take noise and readings of a driver.
+#[derive(Debug, Clone, Default, Args)]
+pub struct NoiseAndDriver {
+    /// Options common to all noise files.
+    #[command(flatten)]
+    pub noise: NoiseOptions,
+    /// The driver's conversion.
+    #[command(flatten)]
+    pub driver: driver::Options,
 }
 
 /// Option of programs that take local gravity with the noise.
