@@ -64,13 +64,10 @@ impl Reading {
             }
         };
         if self.bias_of_recording {
-            text += ". The file has no bias: that of this recording is taken";
+            text += ". The file has no bias, so that of this recording is used";
         }
         if !self.alike.is_empty() {
-            text += &format!(
-                ". The recording does not tell it from a file read {}",
-                self.alike.join(", or ")
-            );
+            text += &format!(". Read {}, it fits as well", self.alike.join(", or "));
         }
         if let Some((file, here)) = self.file_noise.zip(self.noise) {
             let density = format!("{}/sqrt(Hz)", self.sensor.unit());
@@ -92,9 +89,8 @@ impl Reading {
 /// No reading gives a calibration that the recording can judge: the error is that of the format's convention.
 pub fn calibration(foreign: &Foreign, prepared: &Prepared) -> Result<(Calibration, Vec<Reading>)> {
     let raw_unit = prepared.manifest.raw_unit;
-    let noise_only = foreign.parts.present().next().is_none();
-    if let (true, Ok(whole)) = (noise_only, foreign.calibration(raw_unit)) {
-        return Ok((whole, Vec::new()));
+    if let Some(whole) = foreign.whole() {
+        return Ok((whole.clone(), Vec::new()));
     }
     let mut models: PerSensor<Option<Affine<f64>>> = PerSensor::default();
     let mut all = Vec::new();

@@ -136,7 +136,17 @@ impl Foreign {
         self.whole.is_some() || entries.any(has) && self.format.convention.bias != Bias::Absent
     }
 
-    /// Unit of the readings that it is for: of its own, or else `given`.
+    /// Whether it has the noise of a unit, and no calibration.
+    pub fn is_noise_only(&self) -> bool {
+        self.whole.is_none() && self.parts.present().next().is_none()
+    }
+
+    /// The calibration, if the file has all of one.
+    pub(crate) fn whole(&self) -> Option<&Calibration> {
+        self.whole.as_ref()
+    }
+
+    /// Unit of the readings that it is for: as the file says it, or else `given`.
     pub fn raw_unit(&self, given: RawUnit) -> RawUnit {
         self.raw_unit.unwrap_or(given)
     }
@@ -146,10 +156,10 @@ impl Foreign {
     /// # Errors
     /// The file has noise only, or a matrix that cannot be inverted.
     pub fn calibration(&self, given: RawUnit) -> Result<Calibration> {
-        if let Some(whole) = &self.whole {
+        if let Some(whole) = self.whole() {
             return Ok(whole.clone());
         }
-        if self.parts.present().next().is_none() {
+        if self.is_noise_only() {
             let name = self.format.name;
             let problem = format!("it has the noise of a unit for {name}, and no calibration");
             let remedy = "give a file with scale factors or biases";
@@ -178,10 +188,15 @@ impl Foreign {
         Calibration::of_program(models, unit, &self.place)
     }
 
+    /// Messages a second, if the file has them.
+    fn rate_hz(&self) -> Option<f64> {
+        let rate = self.file.numbers(self.format.rate_key?)?;
+        rate.first().copied()
+    }
+
     /// Densities of x, y and z, SI, for messages at the file's rate or else at `rate_hz`; `None` if the file does not have them.
     pub fn density(&self, sensor: Sensor, term: Term, rate_hz: Option<f64>) -> Option<[f64; 3]> {
-        let own = self.format.rate_key.and_then(|key| self.file.numbers(key));
-        let rate_hz = own.map(|rate| rate[0]).or(rate_hz);
+        let rate_hz = self.rate_hz().or(rate_hz);
         let mut keys = self.format.noise_keys.iter();
         let key = keys.find(|key| key.sensor == sensor && key.term == term)?;
         key.read(&self.file, rate_hz.unwrap_or(f64::NAN))
@@ -192,8 +207,7 @@ impl Foreign {
     /// # Errors
     /// Its numbers are those of a sample at a rate that is not known.
     pub fn noise(&self, rate_hz: Option<f64>) -> Result<Option<NoiseFile>> {
-        let own = self.format.rate_key.and_then(|key| self.file.numbers(key));
-        let rate_hz = own.map(|rate| rate[0]).or(rate_hz);
+        let rate_hz = self.rate_hz().or(rate_hz);
         let unknown = |value: f64, unit: &str| FileCoefficient {
             value,
             sigma: f64::NAN,
@@ -207,13 +221,15 @@ impl Foreign {
                 continue;
             };
             let walk = self.density(sensor, Term::K, rate_hz);
+            let place = format!("{}, noise of the {sensor}", self.place);
+            if rate_hz.is_none() {
+                let problem = "the file does not say the rate of its messages";
+                let error = Error::new(place, problem, "give the messages a second");
+                return Err(error.about(Argument::SampleRate));
+            }
             if !white.iter().all(|n| n.is_finite() && *n > 0.0) {
-                let problem = "its noise is that of a sample, and the file does not say the rate, or it is not above 0";
-                let remedy = "give the messages a second";
-                return Err(
-                    Error::new(format!("{}, {sensor}", self.place), problem, remedy)
-                        .about(Argument::SampleRate),
-                );
+                let remedy = "give a file with the noise of a unit";
+                return Err(Error::new(place, "it is not above 0", remedy));
             }
             for (i, axis) in AXES.iter().enumerate() {
                 channel.push(NoiseChannel {

@@ -70,7 +70,7 @@ pub trait Target {
     const NOISE_KEYS: &[NoiseKey] = &[];
     /// Key of the messages a second.
     const RATE_KEY: Option<&str> = None;
-    /// For a file that is none of [`Keyed`]'s: its numbers; `None` if it is another file. The second argument is its path.
+    /// For a file that [`Keyed`] does not read: its numbers; `None` if it is another file. The second argument is its path.
     const UNPACK: Option<fn(&[u8], &str) -> Option<Keyed>> = None;
     /// For a format that stores a whole calibration: that of a file, likewise.
     const WHOLE: Option<Whole> = None;

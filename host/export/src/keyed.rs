@@ -186,7 +186,7 @@ fn is_key(name: &str) -> bool {
     !name.contains(['=', ' ', ',', '(', '[']) && !name.is_empty()
 }
 
-/// Name and value of a line that is none of YAML: `set name = value`, `static const float name[3] = {...};`, `NAME,VALUE`, `echo VALUE > "PATH/NAME"`.
+/// Name and value of a line in another syntax than YAML: `set name = value`, `static const float name[3] = {...};`, `NAME,VALUE`, `echo VALUE > "PATH/NAME"`.
 fn assignment(line: &str) -> Option<(String, String)> {
     if let Some(written) = line.strip_prefix("echo ") {
         let (value, path) = written.split_once('>')?;

@@ -57,8 +57,7 @@ pub fn run(args: &ConvertArgs) -> Result<()> {
         Opened::Foreign(other) if takes_noise => other.noise(args.rate_hz)?,
         _ => None,
     };
-    // A file of noise alone has no calibration to write.
-    let is_noise = matches!(&opened, Opened::Foreign(o) if o.calibration(args.raw_unit).is_err());
+    let is_noise = matches!(&opened, Opened::Foreign(other) if other.is_noise_only());
     let calibration = match is_noise && noise.is_some() {
         true => None,
         false => Some(opened.of_readings(args.raw_unit)?),

@@ -104,7 +104,7 @@ fn the_noise_of_lio_sam_for_ros2() {
     );
 }
 
-/// hku-mars/FAST_LIO, config/avia.yaml (1087a724, GPL-2.0): its numbers are none of a unit, 0.1 (m/s²)² and 0.1 (rad/s)².
+/// hku-mars/FAST_LIO, config/avia.yaml (1087a724, GPL-2.0): round numbers, 0.1 (m/s²)² and 0.1 (rad/s)².
 #[test]
 fn the_variances_of_fast_lio() {
     let text = "common:\n    imu_topic:  \"/livox/imu\"\nmapping:\n    acc_cov: 0.1\n    gyr_cov: 0.1\n    b_acc_cov: 0.0001\n    b_gyr_cov: 0.0001\n    \
