@@ -51,8 +51,8 @@ fn a_log_becomes_a_header_in_two_commands_and_nothing_is_replaced_by_mistake() {
     for command in [
         "fit rec -o cal.toml",
         "export c cal.toml -o cal.h",
-        "allan rec --calibration cal.toml -o noise.toml",
-        "allan rec --calibration cal.toml -o noise.toml",
+        "design -n 12 --reference gravity -o plan.toml",
+        "design -n 12 --reference gravity -o plan.toml",
     ] {
         done(at, command);
     }
