@@ -86,9 +86,9 @@ def verify(
 
 
 Format = Literal[
-    "c", "rust", "json", "kalibr", "openvins", "vins", "orbslam3", "liosam", "fastlio", "imu-calib", "imu-tk", "fusion", "realsense",
-    "depthai", "basalt", "px4", "ardupilot", "betaflight", "inav", "adafruit", "slimenrf", "pigeon", "iio", "ros-imu", "autoware",
-    "gazebo", "matlab", "core",
+    "c", "rust", "json", "kalibr", "openvins", "vins", "orbslam3", "liosam", "fastlio", "dlio", "kf-gins", "navego", "imu-calib",
+    "imu-tk", "fusion", "realsense", "depthai", "basalt", "px4", "ardupilot", "betaflight", "inav", "adafruit", "slimenrf", "pigeon",
+    "iio", "ros-imu", "autoware", "gazebo", "matlab", "core",
 ]
 
 

@@ -5,6 +5,7 @@ export const FORMATS = [
   { name: "C header", file: "mimu.h", args: ["c"], of: "calibration" },
   { name: "Rust with mimu-core", file: "calibration.rs", args: ["rust"], of: "calibration" },
   { name: "JSON", file: "calibration.json", args: ["json"], of: "calibration" },
+  { name: "DLIO", file: "dlio.yaml", args: ["dlio"], of: "calibration" },
   { name: "ROS imu_calib", file: "imu_calib.yaml", args: ["imu-calib"], of: "calibration" },
   { name: "IMU-TK, accelerometer", file: "acc.calib", args: ["imu-tk", "--sensor", "accel"], of: "calibration" },
   { name: "IMU-TK, gyro", file: "gyro.calib", args: ["imu-tk", "--sensor", "gyro"], of: "calibration" },
@@ -28,6 +29,8 @@ export const FORMATS = [
   { name: "ORB-SLAM3", file: "orbslam3.yaml", args: ["orbslam3"], of: "noise" },
   { name: "LIO-SAM", file: "liosam.yaml", args: ["liosam"], of: "noise" },
   { name: "FAST-LIO", file: "fastlio.yaml", args: ["fastlio"], of: "noise" },
+  { name: "KF-GINS", file: "kf-gins.yaml", args: ["kf-gins"], of: "noise" },
+  { name: "NaveGo", file: "imu.m", args: ["navego"], of: "noise" },
   { name: "ROS, sensor_msgs/Imu", file: "covariances.yaml", args: ["ros-imu"], of: "noise" },
   { name: "Gazebo", file: "imu.sdf", args: ["gazebo"], of: "noise" },
 ];

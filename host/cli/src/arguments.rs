@@ -16,6 +16,7 @@ use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{Reference, WholeTurns};
 use mimu_wizard::procedure::Targets;
 
+use crate::output::check_overwritten;
 use crate::status::Status;
 
 #[derive(Args)]
@@ -222,7 +223,7 @@ impl StrictArgs {
 
 #[derive(Args)]
 pub(crate) struct WritingArgs {
-    /// Replace an existing calibration file
+    /// Replace a file that mimu did not write
     #[arg(long)]
     replace: bool,
     /// Write the calibration although it is judged a misfit; the file contains the judgement
@@ -231,24 +232,12 @@ pub(crate) struct WritingArgs {
 }
 
 impl WritingArgs {
-    /// Refuses to replace the file `output`, before the work, but after a test whether it is an input: it may be the only calibration of a unit that took a day in a chamber.
+    /// Refuses to overwrite a file `output` that mimu did not write, before the work, but after a test whether it is an input.
     ///
     /// # Errors
-    /// The file exists and has contents, and `--replace` is not given.
+    /// As of [`check_overwritten`], unless `--replace` is given.
     pub(crate) fn check(&self, output: Option<&Path>) -> Result<()> {
-        let full = |path: &&Path| {
-            let there = std::fs::metadata(path);
-            there.is_ok_and(|there| there.is_file() && there.len() > 0)
-        };
-        match output.filter(full) {
-            Some(path) if !self.replace => Err(Error::new(
-                path.display(),
-                "the file exists",
-                "choose another name, or replace it",
-            )
-            .about(Argument::Replace)),
-            _ => Ok(()),
-        }
+        check_overwritten(&[output.filter(|_| !self.replace)])
     }
 
     /// The error about a result of `place` that is judged a misfit and would therefore not be written; `remedy` says what to do.

@@ -6,7 +6,7 @@
 //! | [`called`] | subcommands that other programs can call |
 //! | `arguments` | arguments that several subcommands share |
 //! | `status` | how a subcommand ended |
-//! | `reading`, `output` | reads recordings; writes text, JSON and files |
+//! | `reading`, `opening`, `output` | reads recordings; opens calibrations; writes text, JSON and files |
 //! | [`report`] | results as JSON, text and page |
 //! | `views` | shows a session of the wizard while it runs |
 //! | `examples` | examples at the end of each help |
@@ -18,6 +18,7 @@ mod cmd;
 mod examples;
 mod hint;
 mod importing;
+mod opening;
 mod output;
 mod reading;
 pub mod report;
@@ -79,6 +80,8 @@ enum Command {
     Noise(cmd::noise::NoiseInUseArgs),
     /// Write a calibration, or noise, in the format of another program
     Export(cmd::export::ExportArgs),
+    /// Write a calibration, mimu's or another program's, in the format of a further program
+    Convert(cmd::convert::ConvertArgs),
     /// Write one page with everything that is known of a unit: verdict, errors, calibration, effects, noise, recordings
     Report(cmd::report::ReportArgs),
     #[cfg(not(target_family = "wasm"))]
@@ -127,6 +130,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Allan(args) => allan::run(&args),
         Command::Noise(args) => cmd::noise::run(&args),
         Command::Export(args) => cmd::export::run(&args).map(done),
+        Command::Convert(args) => cmd::convert::run(&args).map(done),
         Command::Report(args) => cmd::report::run(&args, &typed).map(done),
         #[cfg(not(target_family = "wasm"))]
         Command::Accept(args) => accept::run(&args),

@@ -12,17 +12,15 @@ use std::fmt::Write as _;
 use clap::{Args, ValueEnum};
 use mimu::calibration::Calibration;
 use mimu::quantity::Sensor;
-use mimu_recording::TriadName;
 use mimu_recording::error::Result;
 use serde_json::{Map, Value, json};
 
 use crate::convention::{Bias, Convention, Shape};
-use crate::remaining::{self, Places};
+use crate::layout::{Entry, Numbers};
+use crate::remaining::Places;
 use crate::{Export, Page, Sources, Target, body, driver};
 
-/// The only magnetometer with a place.
-const MAG: TriadName = TriadName::MAG;
-/// How it is written.
+/// How a magnetometer is written.
 const MAGNETIC: Convention = Convention::to_input(Shape::Whole, Bias::SubtractedFromReadings);
 
 /// What is written.
@@ -65,6 +63,11 @@ impl Target for Adafruit {
     const CONVENTION: Convention =
         Convention::to_input(Shape::Absent, Bias::SubtractedFromReadings);
     const FURTHER_TRIADS: bool = true;
+    const LAYOUT: &[Entry] = &[
+        Entry::of(Sensor::Gyro, Numbers::Bias, "gyro_zerorate"),
+        Entry::of(Sensor::Accel, Numbers::Bias, "accel_zerog"),
+    ];
+    const NOT_READ: &[&str] = &["mag_softiron", "mag_hardiron"];
     const PAGES: &[Page] = &[Page::of("Adafruit (hard and soft iron)", "calibration.h")];
 
     /// # Errors
@@ -79,28 +82,12 @@ impl Target for Adafruit {
                 .into_iter()
                 .flatten(),
         );
-        for (sensor, name) in [
-            (Sensor::Gyro, "gyro_zerorate"),
-            (Sensor::Accel, "accel_zerog"),
-        ] {
-            if calibration.table(sensor).is_none() {
-                export.note(format!(
-                    "The calibration has no {sensor}, so nothing is written for it."
-                ));
-                continue;
-            }
-            let readings = options.driver.readings(calibration, place, sensor)?;
-            export.formula(format!(
-                "{sensor}: output = reading - {name}, {}",
-                sensor.unit()
-            ));
-            export.note(readings.line());
-            let gain = readings.forward.matrix.diagonal();
-            export
-                .remaining
-                .push(remaining::scale_factors(sensor, &gain));
-            let bias = Self::CONVENTION.of(&readings)?.bias;
-            all.push((name, sensor.unit(), bias.as_slice().to_vec()));
+        let missing = "nothing is written for it";
+        for (entry, parts) in options.driver.biases::<Self>(from, missing, &mut export)? {
+            let (sensor, name) = (entry.sensor, entry.key);
+            let unit = sensor.unit();
+            export.formula(format!("{sensor}: output = reading - {name}, {unit}"));
+            all.push((name, unit, entry.values(&parts)));
         }
         export.temperature(calibration);
         if options.layout == Layout::Json {
@@ -129,9 +116,7 @@ fn magnetometer(
     options: &Options,
     export: &mut Export,
 ) -> Result<Option<[Array; 2]>> {
-    let others = body::left_out(calibration, |name| name == MAG);
-    export.notes.extend(others);
-    let Some(mag) = calibration.body.iter().find(|triad| triad.triad == MAG) else {
+    let Some(mag) = body::only_mag(calibration, export) else {
         export.note("The calibration has no magnetometer, so nothing is written for it.");
         return Ok(None);
     };

@@ -16,11 +16,13 @@
 use mimu::quantity::Sensor;
 use mimu_recording::TriadKind;
 use mimu_recording::error::{Argument, Result};
-use nalgebra::Vector3;
+use nalgebra::Matrix3;
 
-use crate::convention::{Bias, Convention, Shape, within};
+use crate::convention::{Bias, Convention, Shape};
+use crate::driver::name_of;
+use crate::layout::{Entry, Numbers};
 use crate::parameters::{
-    CONVENTION, Compass, FurtherTriad, GIVE_FACTOR, LETTERS, Options, Parameter,
+    CONVENTION, Compass, FurtherTriad, GIVE_FACTOR, LETTERS, Options, Parameter, Remedy, Row, What,
 };
 use crate::{Export, Page, Sources, Target};
 
@@ -34,6 +36,46 @@ const RANGE_C: [f64; 2] = [-70.0, 80.0];
 const MOST_OFFSET: f64 = 3.5;
 /// Range of an accelerometer's scale factors that it documents.
 const SCALES: [f64; 2] = [0.8, 1.2];
+
+/// Its parameters of each axis.
+const ROWS: [Row; 6] = {
+    const fn row(kind: TriadKind, what: What, name: &'static str) -> Row {
+        let range = match (kind, what) {
+            (TriadKind::Accel, What::Offset) => {
+                let most = [-MOST_OFFSET, MOST_OFFSET];
+                Some((most, 3, " m/s²", GIVE_ZERO))
+            }
+            (TriadKind::Accel, _) => Some((SCALES, 3, "", GIVE_FACTOR)),
+            (TriadKind::Mag, What::Offset) => {
+                let most = [-MOST_COMPASS_OFFSET, MOST_COMPASS_OFFSET];
+                Some((most, 0, " mG", GIVE_COMPASS_FACTOR))
+            }
+            (TriadKind::Mag, What::Scale) => Some((SOFT_IRON[0], 3, "", GIVE_COMPASS_FACTOR)),
+            (TriadKind::Mag, _) => Some((SOFT_IRON[1], 3, "", GIVE_COMPASS_FACTOR)),
+            (TriadKind::Gyro, _) => None,
+        };
+        Row {
+            kind,
+            what,
+            name,
+            range,
+        }
+    }
+    [
+        row(TriadKind::Gyro, What::Offset, "INS_GYR{n}OFFS_{axis}"),
+        row(TriadKind::Accel, What::Offset, "INS_ACC{n}OFFS_{axis}"),
+        row(TriadKind::Accel, What::Scale, "INS_ACC{n}SCAL_{axis}"),
+        row(TriadKind::Mag, What::Offset, "COMPASS_OFS{n}_{axis}"),
+        row(TriadKind::Mag, What::Scale, "COMPASS_DIA{n}_{axis}"),
+        row(TriadKind::Mag, What::Beside, "COMPASS_ODI{n}_{axis}"),
+    ]
+};
+/// What to do about an offset of an accelerometer, and about the numbers of a compass.
+const GIVE_ZERO: Remedy = (
+    "give the raw reading that the driver treats as zero input",
+    Argument::AccelZero,
+);
+const GIVE_COMPASS_FACTOR: Remedy = (GIVE_FACTOR.0, Argument::MagConversion);
 
 /// Inertial units, and magnetometers.
 const MOST: u8 = 3;
@@ -63,6 +105,12 @@ impl Target for ArduPilot {
     const CONVENTION: Convention = CONVENTION;
     const TAKES_BIASES: bool = true;
     const FURTHER_TRIADS: bool = true;
+    const LAYOUT: &[Entry] = &[
+        Entry::of(Sensor::Accel, Numbers::Bias, "INS_ACCOFFS_{AXIS}"),
+        Entry::of(Sensor::Accel, Numbers::LeftDiagonal, "INS_ACCSCAL_{AXIS}"),
+        Entry::of(Sensor::Gyro, Numbers::Bias, "INS_GYROFFS_{AXIS}"),
+    ];
+    const NOT_READ: &[&str] = &["INS_TCAL1", "COMPASS_OFS", "INS_ACC2OFFS", "INS_GYR2OFFS"];
     const PAGES: &[Page] = &[Page::of("ArduPilot", "ardupilot.parm")];
 
     /// # Errors
@@ -155,17 +203,20 @@ fn at_rest(options: &Options, accel: bool, export: &mut Export) {
 
 /// Offsets at the temperature of the calibration. CALTEMP of the first unit has its number; offsets of the first unit have none.
 fn settled(options: &Options, export: &mut Export) -> Result<()> {
-    for cubics in &export.cubics {
+    let offset = |row: &&Row| row.what == What::Offset;
+    for cubics in export.cubics.clone() {
         let Some(settled_c) = cubics.settled_c else {
             continue;
         };
         let name = format!("INS_{}{}_CALTEMP", short(cubics.sensor), options.imu);
         export.parameters.push(Parameter::real(name, settled_c));
-        let settled = cubics.at(settled_c);
-        for axis in 0..3 {
-            let offset = offset(options.imu, cubics.sensor, axis, settled[axis])?;
-            export.parameters.push(offset);
-        }
+        let settled = FurtherTriad {
+            triad: name_of(cubics.sensor),
+            instance: options.imu,
+            offset: cubics.at(settled_c),
+            scale: Matrix3::identity(),
+        };
+        settled.write(ROWS.iter().filter(offset), &number(options.imu), export)?;
     }
     Ok(())
 }
@@ -173,77 +224,18 @@ fn settled(options: &Options, export: &mut Export) -> Result<()> {
 fn at_one_temperature(options: &Options, from: &Sources, export: &mut Export) -> Result<()> {
     let imu = options.imu;
     export.note(format!("ArduPilot subtracts INS_TCAL{imu}_* too: set INS_TCAL{imu}_ENABLE to 0, unless they come from a calibration without these offsets."));
-    for (sensor, offsets, scale) in options.offsets(from, export)? {
-        axes(imu, sensor, [&offsets, &scale], export)?;
-    }
-    Ok(())
-}
-
-/// Offsets and scale factors of an inertial unit's sensor, SI.
-fn axes(
-    imu: u8,
-    sensor: Sensor,
-    [offsets, scale]: [&Vector3<f64>; 2],
-    export: &mut Export,
-) -> Result<()> {
-    for (i, letter) in LETTERS.iter().enumerate() {
-        let out = &mut export.parameters;
-        out.push(offset(imu, sensor, i, offsets[i])?);
-        if sensor == Sensor::Accel {
-            let name = name(imu, sensor, &format!("SCAL_{letter}"));
-            within((sensor, i), &name, (scale[i], 3, ""), SCALES, GIVE_FACTOR)?;
-            out.push(Parameter::real(name, scale[i]));
-        }
+    for of in options.offsets(from, export)? {
+        of.write(&ROWS, &number(of.instance), export)?;
     }
     Ok(())
 }
 
 /// A further triad.
 fn further(of: &FurtherTriad, export: &mut Export) -> Result<()> {
-    let sensor = match of.triad.kind {
-        TriadKind::Gyro => Sensor::Gyro,
-        TriadKind::Accel => Sensor::Accel,
-        TriadKind::Mag => return compass(of, export),
-    };
-    axes(
-        of.instance,
-        sensor,
-        [&of.offset, &of.scale.diagonal()],
-        export,
-    )
-}
-
-fn compass(of: &FurtherTriad, export: &mut Export) -> Result<()> {
-    let (n, s) = (number(of.instance), &of.scale);
-    let [on, beside] = SOFT_IRON;
-    let most = [-MOST_COMPASS_OFFSET, MOST_COMPASS_OFFSET];
-    let unit = " mG";
-    for (what, values, decimals, unit, range) in [
-        ("OFS", of.offset, 0, unit, most),
-        ("DIA", s.diagonal(), 3, "", on),
-        (
-            "ODI",
-            Vector3::new(s[(0, 1)], s[(0, 2)], s[(1, 2)]),
-            3,
-            "",
-            beside,
-        ),
-    ] {
-        for (i, letter) in LETTERS.iter().enumerate() {
-            let name = format!("COMPASS_{what}{n}_{letter}");
-            let remedy = (
-                "give the factor by which the driver converts",
-                Argument::MagConversion,
-            );
-            within(
-                (of.triad, i),
-                &name,
-                (values[i], decimals, unit),
-                range,
-                remedy,
-            )?;
-            export.parameters.push(Parameter::real(name, values[i]));
-        }
+    let n = number(of.instance);
+    of.write(&ROWS, &n, export)?;
+    if of.triad.kind != TriadKind::Mag {
+        return Ok(());
     }
     let scale = Parameter::real(format!("COMPASS_SCALE{n}"), 1.0);
     export.parameters.push(scale);
@@ -255,20 +247,6 @@ fn compass(of: &FurtherTriad, export: &mut Export) -> Result<()> {
     }
     export.note(format!("{name}: the numbers are for the readings after the rotation of its mounting (COMPASS_ORIENT{n}, AHRS_ORIENTATION). ArduPilot takes a compass for calibrated only if COMPASS_DEV_ID{n} is its id: calibrate there once, then load this file, with COMPASS_LEARN 0."));
     Ok(())
-}
-
-/// Parameter of an offset, SI.
-fn offset(imu: u8, sensor: Sensor, axis: usize, offset: f64) -> Result<Parameter> {
-    let name = name(imu, sensor, &format!("OFFS_{}", LETTERS[axis]));
-    if sensor == Sensor::Accel {
-        let range = [-MOST_OFFSET, MOST_OFFSET];
-        let remedy = (
-            "give the raw reading that the driver treats as zero input",
-            Argument::AccelZero,
-        );
-        within((sensor, axis), &name, (offset, 3, " m/s²"), range, remedy)?;
-    }
-    Ok(Parameter::real(name, offset))
 }
 
 /// Short name of a sensor in parameter names.

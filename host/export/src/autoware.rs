@@ -7,31 +7,20 @@
 
 use std::fmt::Write as _;
 
-use clap::Args;
 use mimu::quantity::{AXES, Sensor};
 use mimu_recording::error::Result;
 
 use crate::convention::{Bias, Convention, Shape};
+use crate::layout::{Entry, NoiseKey, NoiseOf, Numbers, white};
 use crate::remaining::{Places, Remaining};
-use crate::worst_axis::NoiseOptions;
+use crate::worst_axis::NoiseAndDriver;
 use crate::{Export, Noise, Sources, Target, driver, yaml};
-
-/// Options of the file.
-#[derive(Debug, Clone, Default, Args)]
-pub struct Options {
-    /// Options common to all noise files.
-    #[command(flatten)]
-    pub noise: NoiseOptions,
-    /// The driver's conversion.
-    #[command(flatten)]
-    pub driver: driver::Options,
-}
 
 /// The format.
 pub struct Autoware;
 
 impl Target for Autoware {
-    type Options = Options;
+    type Options = NoiseAndDriver;
     const NAME: &str = "autoware";
     const ABOUT: &str = "Biases of the gyro and noise for Autoware: imu_corrector.param.yaml";
     const CONTENTS: &str = "bias of the gyro, noise";
@@ -39,17 +28,32 @@ impl Target for Autoware {
     const CONVENTION: Convention =
         Convention::to_input(Shape::Absent, Bias::SubtractedFromReadings);
     const NOISE: Noise = Noise::Needed;
+    const LAYOUT: &[Entry] = &[Entry::of(
+        Sensor::Gyro,
+        Numbers::Bias,
+        "angular_velocity_offset_{axis}",
+    )];
+    const NOISE_KEYS: &[NoiseKey] = &[
+        white(
+            "angular_velocity_stddev_{axis}{axis}",
+            "rad/s",
+            Sensor::Gyro,
+        )
+        .of(NoiseOf::Deviation),
+        white("acceleration_stddev", "m/s^2", Sensor::Accel).of(NoiseOf::Deviation),
+    ];
 
     /// # Errors
     /// The calibration, a triad of it or the noise is missing, C is singular, or an error of [`crate::worst_axis::WalkOptions::axes`].
-    fn export(from: &Sources, options: &Options) -> Result<Export> {
+    fn export(from: &Sources, options: &NoiseAndDriver) -> Result<Export> {
         from.calibration()?;
         let noise = from.noise()?;
         let (calibration, readings) = options.driver.both(from)?;
         let gain = readings.as_ref().map(driver::Readings::noise_gain);
         let axes = options.noise.walks.axes(noise, &gain)?;
         let rate = options.noise.rate_hz(noise);
-        let deviations = axes.map(|three| three.map(|axis| axis.white.value * rate.sqrt()));
+        let deviations =
+            axes.map(|three| three.map(|axis| NoiseOf::Deviation.number(axis.white.value, rate)));
         let mut export = Export::new::<Self>(from);
         export.formula(
             "gyro: output = reading - angular_velocity_offset, rad/s, in the frame of the message",
@@ -66,10 +70,8 @@ impl Target for Autoware {
         let bias = Remaining::of_bias(Sensor::Accel, &readings.accel.forward.bias);
         export.remaining.push(bias);
         let mut out = export.head("#", from) + "/**:\n  ros__parameters:\n";
-        let offsets = Self::CONVENTION.of(&readings.gyro)?.bias;
-        for (axis, offset) in AXES.iter().zip(offsets.iter()) {
-            let offset = yaml::number(*offset);
-            let _ = writeln!(out, "    angular_velocity_offset_{axis}: {offset}  # rad/s");
+        for (key, offset) in Self::LAYOUT[0].written(&Self::CONVENTION.of(&readings.gyro)?) {
+            let _ = writeln!(out, "    {key}: {}  # rad/s", yaml::number(offset[0]));
         }
         for (axis, deviation) in AXES.iter().zip(deviations.gyro) {
             let deviation = yaml::number(deviation);

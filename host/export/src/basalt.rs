@@ -8,70 +8,54 @@
 //! The other keys of the file are those of the cameras. Source: VladyslavUsenko/basalt-headers, calibration/calib_bias.hpp, `CalibAccelBias` and
 //! `CalibGyroBias`; calibration/calibration.hpp; serialization/headers_serialization.h (2021-06). Files of before 2020 have one density for three axes.
 
-use clap::Args;
 use mimu::quantity::{PerSensor, Sensor};
 use mimu_core::compensation::Affine;
 use mimu_recording::error::{Error, Result};
 use nalgebra::Matrix3;
 use serde::Serialize;
+use serde_json::{Map, Value, json};
 
-use crate::convention::{Bias, Convention, Factors, Parts, Shape, Triangle};
-use crate::driver::{self, Readings};
+use crate::convention::{Bias, Convention, Factors, Shape, Triangle};
+use crate::driver::Readings;
+use crate::layout::{Entry, NoiseKey, Numbers, walk, white};
 use crate::remaining::Places;
-use crate::worst_axis::{Densities, NoiseOptions};
+use crate::worst_axis::{Densities, NoiseAndDriver};
 use crate::{Export, Page, Sources, Target, heading};
-
-/// Options of the file.
-#[derive(Debug, Clone, Default, Args)]
-pub struct Options {
-    /// Options common to all noise files.
-    #[command(flatten)]
-    pub noise: NoiseOptions,
-    /// The driver's conversion.
-    #[command(flatten)]
-    pub driver: driver::Options,
-}
 
 /// The file. Basalt's reader takes the first key for the calibration, so the comments are the second.
 #[derive(Serialize)]
 struct File {
-    value0: Value0,
+    value0: Map<String, Value>,
     about: Vec<String>,
-}
-
-#[derive(Serialize)]
-struct Value0 {
-    calib_accel_bias: Vec<f64>,
-    calib_gyro_bias: Vec<f64>,
-    #[serde(flatten)]
-    noise: Option<Noise>,
-}
-
-#[derive(Serialize)]
-struct Noise {
-    imu_update_rate: f64,
-    accel_noise_std: [f64; 3],
-    gyro_noise_std: [f64; 3],
-    accel_bias_std: [f64; 3],
-    gyro_bias_std: [f64; 3],
 }
 
 /// The format.
 pub struct Basalt;
 
 impl Target for Basalt {
-    type Options = Options;
+    type Options = NoiseAndDriver;
     const NAME: &str = "basalt";
     const ABOUT: &str = "Both triads and noise for Basalt: the inertial part of its calibration";
     const CONTENTS: &str = "C and o of both triads; with `--noise` also noise";
     const READERS: &str = "Basalt";
     const CONVENTION: Convention = Convention::to_input(Shape::Whole, Bias::SubtractedFromInput);
     const NOISE: crate::Noise = crate::Noise::Optional;
+    const LAYOUT: &[Entry] = &[
+        Entry::of(Sensor::Accel, Numbers::BiasThenLower, "calib_accel_bias").scaled(1.0, 1.0),
+        Entry::of(Sensor::Gyro, Numbers::BiasThenLeft, "calib_gyro_bias").scaled(1.0, 1.0),
+    ];
+    const NOISE_KEYS: &[NoiseKey] = &[
+        white("accel_noise_std", "", Sensor::Accel),
+        white("gyro_noise_std", "", Sensor::Gyro),
+        walk("accel_bias_std", "", Sensor::Accel),
+        walk("gyro_bias_std", "", Sensor::Gyro),
+    ];
+    const RATE_KEY: Option<&str> = Some("imu_update_rate");
     const PAGES: &[Page] = &[Page::of("Basalt", "basalt_imu.json")];
 
     /// # Errors
     /// The calibration or a triad of it is missing, C is singular, or an error of [`crate::worst_axis::WalkOptions::axes`].
-    fn export(from: &Sources, options: &Options) -> Result<Export> {
+    fn export(from: &Sources, options: &NoiseAndDriver) -> Result<Export> {
         let (calibration, readings) = options.driver.both(from)?;
         // C = Qᵀ L is Cᵀ = Lᵀ Q.
         let c = &readings.accel.inverse.matrix;
@@ -99,7 +83,7 @@ impl Target for Basalt {
                     .noise
                     .walks
                     .axes(noise, &PerSensor::both([1.0; 3]))?;
-                Some(densities(&axes, options.noise.rate_hz(noise)))
+                Some((axes, options.noise.rate_hz(noise)))
             }
             None => {
                 export.note("The file has no noise. Add --noise for accel_noise_std, gyro_noise_std, accel_bias_std and gyro_bias_std.");
@@ -117,11 +101,18 @@ impl Target for Basalt {
         let gyro = rotation * readings.gyro.inverse.matrix;
         let gyro = in_frame(readings.gyro, gyro)?;
         let accel = in_frame(readings.accel, triangle.transpose())?;
-        let value0 = Value0 {
-            calib_accel_bias: parameters(&accel, |i, j| i >= j),
-            calib_gyro_bias: parameters(&gyro, |_, _| true),
-            noise,
-        };
+        let mut value0 = Map::new();
+        for (entry, parts) in Self::LAYOUT.iter().zip([&accel, &gyro]) {
+            value0.insert(entry.key.into(), json!(entry.values(parts)));
+        }
+        if let Some((axes, rate_hz)) = noise {
+            value0.insert("imu_update_rate".into(), json!(rate_hz));
+            for key in Self::NOISE_KEYS {
+                let number = |axis: &Densities| key.number(axis.of(key.term).value, rate_hz);
+                let numbers = axes[key.sensor].each_ref().map(number);
+                value0.insert(key.key.into(), json!(numbers));
+            }
+        }
         let about = heading::of(&export, from);
         let text = serde_json::to_string_pretty(&File { value0, about });
         let text = text.map_err(|e| {
@@ -129,27 +120,5 @@ impl Target for Basalt {
             Error::new("export", problem, "fit the recording again")
         })?;
         Ok(export.with(text + "\n"))
-    }
-}
-
-/// b and the elements of S that `has` a place, by columns.
-fn parameters(of: &Parts, has: impl Fn(usize, usize) -> bool) -> Vec<f64> {
-    let s = of.left - Matrix3::identity();
-    let mut out: Vec<f64> = of.bias.iter().copied().collect();
-    for j in 0..3 {
-        out.extend((0..3).filter(|i| has(*i, j)).map(|i| s[(i, j)]));
-    }
-    out
-}
-
-fn densities(axes: &PerSensor<[Densities; 3]>, rate: f64) -> Noise {
-    let white = |sensor: Sensor| [0, 1, 2].map(|i| axes[sensor][i].white.value);
-    let walk = |sensor: Sensor| [0, 1, 2].map(|i| axes[sensor][i].walk.value);
-    Noise {
-        imu_update_rate: rate,
-        accel_noise_std: white(Sensor::Accel),
-        gyro_noise_std: white(Sensor::Gyro),
-        accel_bias_std: walk(Sensor::Accel),
-        gyro_bias_std: walk(Sensor::Gyro),
     }
 }

@@ -14,7 +14,8 @@ use mimu_recording::error::Result;
 
 use crate::convention::{Bias, Convention, Shape};
 use crate::driver::{self, positive};
-use crate::flight_codes::{codes, compass, whole, whole_of_compass};
+use crate::flight_codes::{CODE, CODES, MAG, codes, compass, whole};
+use crate::layout::{Entry, Numbers};
 use crate::remaining;
 use crate::{Export, Page, Sources, Target};
 
@@ -42,6 +43,9 @@ impl Target for Betaflight {
     const CONVENTION: Convention =
         Convention::to_input(Shape::Absent, Bias::SubtractedFromReadings);
     const FURTHER_TRIADS: bool = true;
+    const LAYOUT: &[Entry] =
+        &[Entry::of(Sensor::Accel, Numbers::Bias, "acc_calibration").scaled(0.0, CODE)];
+    const NOT_READ: &[&str] = &["mag_calibration"];
     const PAGES: &[Page] = &[Page::of("Betaflight", "betaflight.txt")];
 
     /// # Errors
@@ -64,12 +68,15 @@ impl Target for Betaflight {
         let scale = remaining::scale_factors(Sensor::Accel, &accel.gain);
         export.remaining.push(scale);
         export.remaining.push(accel.rounding());
-        let zero = |i: usize| whole(i, "acc_calibration", accel.zero[i], [-32768, 32767]);
-        let (x, y, z) = (zero(0)?, zero(1)?, zero(2)?);
+        let [x, y, z] = whole(
+            Sensor::Accel,
+            &|_| "acc_calibration".into(),
+            &accel.zero,
+            CODES,
+        )?;
         let mut lines = format!("set acc_calibration = {x},{y},{z},1\n");
         if let Some([zero, gain]) = compass(from, Self::CONVENTION, &mut export)? {
-            let of = |i: usize| whole_of_compass(i, "mag_calibration", zero[i], [-32768, 32767]);
-            let (x, y, z) = (of(0)?, of(1)?, of(2)?);
+            let [x, y, z] = whole(MAG, &|_| "mag_calibration".into(), &zero, CODES)?;
             lines += &format!("set mag_calibration = {x},{y},{z}\n");
             let (mean, most) = (gain.mean(), gain.max() - gain.min());
             export.formula("mag: output = code - mag_calibration on each axis of the craft, after the alignment of sensor and board");

@@ -49,6 +49,16 @@ pub(crate) fn left_out(
     names.map(|names| format!("{names}: the format has no place for it, so it is not in the file."))
 }
 
+/// The first magnetometer, for a format with a place for one; notes the triads that are left out.
+pub(crate) fn only_mag<'a>(
+    calibration: &'a Calibration,
+    export: &mut Export,
+) -> Option<&'a BodyTriad> {
+    let is_it = |name: TriadName| name == TriadName::MAG;
+    export.notes.extend(left_out(calibration, is_it));
+    calibration.body.iter().find(|triad| is_it(triad.triad))
+}
+
 fn list(names: impl Iterator<Item = TriadName>) -> Option<String> {
     let names: Vec<String> = names.map(|name| name.to_string()).collect();
     (!names.is_empty()).then(|| names.join(", "))

@@ -22,6 +22,8 @@ use mimu_recording::error::{Argument, Error, Result};
 use nalgebra::Matrix3;
 use serde_json::{Value, json};
 
+use crate::format::Whole;
+use crate::layout::{Entry, Numbers};
 use crate::remaining::Places;
 use crate::template::fill;
 use crate::{Export, Page, Sources, Target, body};
@@ -45,6 +47,14 @@ impl Target for C {
     const CONTENTS: &str = "everything: affine model, curves, lags of the dies, effects";
     const READERS: &str = "any C99 compiler";
     const FURTHER_TRIADS: bool = true;
+    const TAKES_RAW: bool = true;
+    const LAYOUT: &[Entry] = &[
+        Entry::of(Sensor::Gyro, Numbers::Left, "*_gyro_C"),
+        Entry::of(Sensor::Gyro, Numbers::Bias, "*_gyro_o"),
+        Entry::of(Sensor::Accel, Numbers::Left, "*_accel_C"),
+        Entry::of(Sensor::Accel, Numbers::Bias, "*_accel_o"),
+    ];
+    const WHOLE: Option<Whole> = Some(program_text);
     const PAGES: &[Page] = &[Page::of("C header", "mimu.h")];
 
     /// # Errors
@@ -286,4 +296,16 @@ fn rows(matrix: &Matrix3<f64>) -> String {
     let rows = matrix.row_iter();
     let rows: Vec<String> = rows.map(|row| list(row.iter().copied())).collect();
     rows.join(",\n    ")
+}
+
+/// Refuses a header whose curves, lags or effects are program text; `None` for any other file, whose constants are numbers.
+fn program_text(bytes: &[u8], place: &str) -> Option<Result<Calibration>> {
+    let text = std::str::from_utf8(bytes).ok()?;
+    let functions = ["_remove_effects(", "_follow("].map(|name| text.contains(name));
+    let is_one = text.contains("static inline") && functions.contains(&true);
+    is_one.then(|| {
+        let problem = "its curves or effects are program text, which is not read";
+        let remedy = "give the calibration file, or its export as JSON";
+        Err(Error::new(place, problem, remedy))
+    })
 }

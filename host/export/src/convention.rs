@@ -8,10 +8,11 @@
 //! | `ToInput` | `x = M y ± β`, β = ±o | `x = M (y ± β)`, β = ∓b |
 //! | `ToReading` | | `y = M x ± β`, β = ±b |
 //!
-//! M is C or P, as [`Shape`] says how much of it. The frame is that of the calibration where a format does not say another. A reader of a program's file
-//! gets C from `left right` (or P), and o or b from β by the same table.
+//! M is C or P, as [`Shape`] says how much of it. The frame is that of the calibration where a format does not say another. [`Convention::of`] makes the
+//! numbers of a file, [`Convention::inverse`] reads them. Where they are in the file, its [`Entry`](crate::layout::Entry)s say.
 
 use mimu::quantity::AXES;
+use mimu_core::compensation::Affine;
 use mimu_recording::TriadName;
 use mimu_recording::error::{Argument, Error, Result};
 use nalgebra::{Matrix3, Vector3};
@@ -134,6 +135,27 @@ impl Convention {
             Bias::Absent => Vector3::zeros(),
         };
         Ok(Parts { left, right, bias })
+    }
+
+    /// `x = C y + o` of these numbers, the reverse of [`Self::of`]; `None` if the matrix is singular.
+    pub fn inverse(&self, parts: &Parts) -> Option<Affine<f64>> {
+        let product = parts.left * parts.right;
+        let matrix = match self.maps {
+            Maps::ToInput => product,
+            Maps::ToReading => product.try_inverse()?,
+        };
+        let to_input = match self.maps {
+            Maps::ToInput => matrix,
+            Maps::ToReading => -matrix,
+        };
+        let offset = match self.bias {
+            Bias::AddedToReadings => to_input * parts.bias,
+            Bias::SubtractedFromReadings => -to_input * parts.bias,
+            Bias::AddedToInput => parts.bias,
+            Bias::SubtractedFromInput => -parts.bias,
+            Bias::Absent => Vector3::zeros(),
+        };
+        Some(Affine { matrix, offset })
     }
 }
 
@@ -276,6 +298,8 @@ mod tests {
         ] {
             let of = |convention: Convention| {
                 let parts = convention.of(&readings).unwrap();
+                let read = convention.inverse(&parts).unwrap();
+                assert!((read.apply(&y) - x).amax() < 1e-12, "{convention:?}");
                 (parts.left * parts.right, parts.bias)
             };
             let (c, b) = of(Convention::to_input(shape, Bias::AddedToReadings));

@@ -1,8 +1,11 @@
 //! A calibration in the encoding of the device, for programs with `mimu-core` ([`mimu_core::stored`]).
 
+use mimu::calibration::Calibration;
 use mimu_device::Image;
+use mimu_recording::UNNAMED;
 use mimu_recording::error::Result;
 
+use crate::format::Whole;
 use crate::{Export, Nothing, Page, Sources, Target};
 
 /// The format.
@@ -14,6 +17,7 @@ impl Target for Core {
     const ABOUT: &str = "The bytes that a device stores, for programs with mimu-core";
     const CONTENTS: &str = "everything, as the bytes that a device stores";
     const READERS: &str = "Rust programs with `mimu-core`";
+    const WHOLE: Option<Whole> = Some(whole);
     const PAGES: &[Page] = &[Page::of("bytes for mimu-core", "calibration.bin")];
 
     /// # Errors
@@ -29,4 +33,10 @@ impl Target for Core {
         export.notes.extend(image.warnings);
         Ok(export.with(image.bytes))
     }
+}
+
+/// The calibration of bytes that a device would take.
+fn whole(bytes: &[u8], place: &str) -> Option<Result<Calibration>> {
+    let is_one = mimu_core::stored::decode(bytes).is_ok();
+    is_one.then(|| mimu_device::calibration(bytes, None, UNNAMED, place))
 }

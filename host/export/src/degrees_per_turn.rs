@@ -2,13 +2,12 @@
 
 use mimu::quantity::Sensor;
 use mimu_recording::error::Result;
-use nalgebra::Vector3;
 
-use crate::convention::Convention;
+use crate::convention::{Convention, Parts};
 use crate::remaining::Places;
 use crate::{Export, Sources, driver};
 
-/// What the gyro reads on each axis for a rate of 1 about it, the diagonal of P of the driver's readings; adds to `export` what such a format leaves.
+/// The numbers of the gyro, whose left factor is what it reads on each axis for a rate of 1 about it; adds to `export` what such a format leaves.
 ///
 /// # Errors
 /// No gyro is calibrated, C is singular, or the driver's factor is unknown.
@@ -17,7 +16,7 @@ pub(crate) fn gains(
     driver: &driver::Options,
     convention: Convention,
     export: &mut Export,
-) -> Result<Vector3<f64>> {
+) -> Result<Parts> {
     let (calibration, place) = from.calibration()?;
     driver.needs_factor(calibration, Sensor::Gyro)?;
     let readings = driver.readings(calibration, place, Sensor::Gyro)?;
@@ -28,5 +27,5 @@ pub(crate) fn gains(
     }
     export.leaves(calibration, Places::Axes);
     export.remaining.retain(|r| r.sensor == Sensor::Gyro);
-    Ok(convention.of(&readings)?.left.diagonal())
+    convention.of(&readings)
 }

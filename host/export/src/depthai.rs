@@ -12,7 +12,9 @@ use mimu::quantity::{AXES, PerSensor, Sensor};
 use mimu_recording::error::Result;
 use serde_json::{Map, Value, json};
 
-use crate::convention::{Bias, Convention, Parts, Shape};
+use crate::convention::{Bias, Convention, Shape};
+use crate::driver::Readings;
+use crate::layout::{Entry, NoiseKey, Numbers, walk, white};
 use crate::remaining::Places;
 use crate::worst_axis::{self, WalkOptions};
 use crate::{Export, Noise, Page, Sources, Target, driver, heading};
@@ -42,6 +44,24 @@ impl Target for DepthAi {
     const READERS: &str = "OAK cameras, DepthAI 3.6";
     const CONVENTION: Convention = Convention::to_input(Shape::Whole, Bias::AddedToInput);
     const NOISE: Noise = Noise::Optional;
+    const LAYOUT: &[Entry] = &[
+        Entry::of(
+            Sensor::Accel,
+            Numbers::LeftBesideBias,
+            "imuCalibrationParams/accelerometer",
+        ),
+        Entry::of(
+            Sensor::Gyro,
+            Numbers::LeftBesideBias,
+            "imuCalibrationParams/gyroscope",
+        ),
+    ];
+    const NOISE_KEYS: &[NoiseKey] = &[
+        white("noise/accelerometer/{axis}/noiseDensity", "", Sensor::Accel),
+        walk("noise/accelerometer/{axis}/randomWalk", "", Sensor::Accel),
+        white("noise/gyroscope/{axis}/noiseDensity", "", Sensor::Gyro),
+        walk("noise/gyroscope/{axis}/randomWalk", "", Sensor::Gyro),
+    ];
     const PAGES: &[Page] = &[Page::of("OAK cameras (DepthAI)", "imu.json")];
 
     /// # Errors
@@ -57,8 +77,8 @@ impl Target for DepthAi {
         export.temperature(calibration);
         export.leaves(calibration, Places::Matrix);
         let mut triads = json!({
-            "accelerometer": rows(&Self::CONVENTION.of(&readings.accel)?),
-            "gyroscope": rows(&Self::CONVENTION.of(&readings.gyro)?),
+            "accelerometer": rows(0, &readings.accel)?,
+            "gyroscope": rows(1, &readings.gyro)?,
         });
         match from.noise {
             Some(_) => triads["noise"] = noise(from, options, &mut export)?,
@@ -73,16 +93,9 @@ impl Target for DepthAi {
     }
 }
 
-fn rows(of: &Parts) -> Value {
-    let row = |i: usize| {
-        json!([
-            of.left[(i, 0)],
-            of.left[(i, 1)],
-            of.left[(i, 2)],
-            of.bias[i]
-        ])
-    };
-    json!([row(0), row(1), row(2)])
+fn rows(entry: usize, readings: &Readings) -> Result<Value> {
+    let values = DepthAi::LAYOUT[entry].values(&DepthAi::CONVENTION.of(readings)?);
+    Ok(values.chunks(4).map(|row| json!(row)).collect())
 }
 
 /// Noise of each axis of the calibrated readings.

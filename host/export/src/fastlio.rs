@@ -7,11 +7,11 @@
 
 use clap::Args;
 use mimu::quantity::Sensor::{Accel, Gyro};
-use mimu_allan::model::Term::{K, N};
 use mimu_recording::error::Result;
 
+use crate::layout::{NoiseKey, NoiseOf, walk, white};
 use crate::worst_axis::{NoiseOptions, keys_file};
-use crate::{Export, Noise, Page, Sources, Target};
+use crate::{Export, Noise, Page, Sources, Target, noise_interval};
 
 /// Options of the file.
 #[derive(Debug, Clone, Args)]
@@ -34,6 +34,12 @@ impl Target for FastLio {
     const CONTENTS: &str = "variances of one sample";
     const READERS: &str = "FAST-LIO (`--ros2` likewise)";
     const NOISE: Noise = Noise::Only;
+    const NOISE_KEYS: &[NoiseKey] = &[
+        white("acc_cov", "(m/s^2)^2", Accel).of(NoiseOf::Variance),
+        white("gyr_cov", "(rad/s)^2", Gyro).of(NoiseOf::Variance),
+        walk("b_acc_cov", "(m/s^3)^2", Accel).of(NoiseOf::Variance),
+        walk("b_gyr_cov", "(rad/s^2)^2", Gyro).of(NoiseOf::Variance),
+    ];
     const PAGES: &[Page] = &[Page::of("FAST-LIO", "fastlio.yaml")];
 
     /// # Errors
@@ -43,23 +49,15 @@ impl Target for FastLio {
         let rate = options.noise.rate_hz(noise);
         let mut export = Export::new::<Self>(from);
         export.formula(format!(
-            "Variances of one sample at {rate:.3} Hz: acc_cov = N^2 rate, b_acc_cov = K^2 rate, and so for the gyro; the worst axis, with the {} % interval behind each.",
-            100.0 * noise.confidence
+            "Variances of one sample at {rate:.3} Hz: acc_cov = N^2 rate, b_acc_cov = K^2 rate, and so for the gyro; the worst axis{}.",
+            noise_interval(noise, ", with the {} % interval behind each")
         ));
         export.note("Copy these keys into the configuration of FAST-LIO.");
         let (layout, indent) = match options.ros2 {
             true => ("/**:\n  ros__parameters:\n    mapping:\n", "      "),
             false => ("mapping:\n", "  "),
         };
-        let keys = [
-            ("acc_cov", "(m/s^2)^2", Accel, N),
-            ("gyr_cov", "(rad/s)^2", Gyro, N),
-            ("b_acc_cov", "(m/s^3)^2", Accel, K),
-            ("b_gyr_cov", "(rad/s^2)^2", Gyro, K),
-        ];
         let text = ["", layout, indent];
-        keys_file(export, from, &options.noise.walks, text, keys, |density| {
-            density * density * rate
-        })
+        keys_file::<Self>(export, from, (&options.noise.walks, rate), text)
     }
 }

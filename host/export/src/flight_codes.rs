@@ -2,7 +2,9 @@
 //!
 //! Their drivers deliver whole codes, `acc_1G` of them for 1 g, whatever the unit's scale factor. The firmware subtracts whole codes.
 
-use mimu::quantity::Sensor;
+use std::fmt::Display;
+
+use mimu::quantity::{AXES, Sensor};
 use mimu::readable::STANDARD_GRAVITY;
 use mimu_recording::error::{Argument, Result};
 use mimu_recording::{RawUnit, TriadName};
@@ -74,7 +76,11 @@ pub(crate) fn codes(
 }
 
 /// The compass of these firmwares.
-const MAG: TriadName = TriadName::MAG;
+pub(crate) const MAG: TriadName = TriadName::MAG;
+/// Range of a bias in codes.
+pub(crate) const CODES: [i32; 2] = [-32768, 32767];
+/// One code of nearly every accelerometer, m/s², for files that do not say it: 2048 for 1 g.
+pub(crate) const CODE: f64 = STANDARD_GRAVITY / 2048.0;
 
 /// The magnetometer in codes: its bias in the convention of the firmware, and the codes for the calibration's unit of the field, on the sensor's own axes.
 /// `None`, with a note, if there is none or its readings are not in codes.
@@ -87,9 +93,7 @@ pub(crate) fn compass(
     export: &mut Export,
 ) -> Result<Option<[Vector3<f64>; 2]>> {
     let (calibration, place) = from.calibration()?;
-    let others = body::left_out(calibration, |name| name == MAG);
-    export.notes.extend(others);
-    let Some(mag) = calibration.body.iter().find(|triad| triad.triad == MAG) else {
+    let Some(mag) = body::only_mag(calibration, export) else {
         return Ok(None);
     };
     if mag.raw_unit != RawUnit::Count {
@@ -104,43 +108,29 @@ pub(crate) fn compass(
     Ok(Some([bias, readings.forward.matrix.diagonal().abs()]))
 }
 
-/// `value` of an axis of the accelerometer as a whole number within `range`.
+/// `values` as whole numbers within `range`; `name` is that of an axis in the firmware.
 ///
 /// # Errors
-/// It is outside.
-pub(crate) fn whole(axis: usize, name: &str, value: f64, range: [i32; 2]) -> Result<i32> {
-    let remedy = (
-        "check --acc-1g, and give the factor by which the readings were converted",
-        Argument::AccelConversion,
-    );
-    rounded((Sensor::Accel, axis), name, value, range, remedy)
-}
-
-/// The same of the compass.
-///
-/// # Errors
-/// It is outside.
-pub(crate) fn whole_of_compass(
-    axis: usize,
-    name: &str,
-    value: f64,
+/// One is outside.
+pub(crate) fn whole(
+    triad: impl Display + Copy,
+    name: &dyn Fn(&str) -> String,
+    values: &Vector3<f64>,
     range: [i32; 2],
-) -> Result<i32> {
-    let remedy = (
-        "record the codes of the firmware, and fit again",
-        Argument::RawUnit,
-    );
-    rounded((MAG, axis), name, value, range, remedy)
-}
-
-fn rounded(
-    of: (impl std::fmt::Display, usize),
-    name: &str,
-    value: f64,
-    range: [i32; 2],
-    remedy: (&str, Argument),
-) -> Result<i32> {
-    let rounded = value.round();
-    within(of, name, (rounded, 0, ""), range.map(f64::from), remedy)?;
-    Ok(rounded as i32)
+) -> Result<[i32; 3]> {
+    let remedy = match triad.to_string() == MAG.to_string() {
+        true => (
+            "record the codes of the firmware, and fit again",
+            Argument::RawUnit,
+        ),
+        false => (
+            "check --acc-1g, and give the factor by which the readings were converted",
+            Argument::AccelConversion,
+        ),
+    };
+    for (i, axis) in AXES.iter().enumerate() {
+        let value = (values[i].round(), 0, "");
+        within((triad, i), &name(axis), value, range.map(f64::from), remedy)?;
+    }
+    Ok([0, 1, 2].map(|i| values[i].round() as i32))
 }

@@ -2,10 +2,13 @@
 
 use clap::error::ErrorKind;
 use clap::{ArgMatches, Args, Command, FromArgMatches, Subcommand};
+use mimu::calibration::Calibration;
 use mimu_recording::error::Result;
 
 use crate::convention::{Bias, Convention, Shape};
-use crate::{Export, FORMATS, Sources};
+use crate::keyed::Keyed;
+use crate::layout::{Entry, NoiseKey};
+use crate::{Export, FORMATS, Sources, layout};
 
 /// Whether a format stores the noise of a unit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -57,6 +60,20 @@ pub trait Target {
     const READERS: &str;
     /// How it writes the model of a triad: unless it says otherwise C and o, as in the calibration file.
     const CONVENTION: Convention = Convention::to_input(Shape::Whole, Bias::AddedToInput);
+    /// Where the numbers of [`Self::CONVENTION`] are.
+    const LAYOUT: &[Entry] = &[];
+    /// Beginnings of keys with what its reader leaves out.
+    const NOT_READ: &[&str] = &[];
+    /// Whether the program takes the readings of the unit, in its own raw unit; otherwise those of a driver, in SI.
+    const TAKES_RAW: bool = false;
+    /// Where the noise is.
+    const NOISE_KEYS: &[NoiseKey] = &[];
+    /// Key of the messages a second.
+    const RATE_KEY: Option<&str> = None;
+    /// For a file that [`Keyed`] does not read: its numbers; `None` if it is another file. The second argument is its path.
+    const UNPACK: Option<fn(&[u8], &str) -> Option<Keyed>> = None;
+    /// For a format that stores a whole calibration: that of a file, likewise.
+    const WHOLE: Option<Whole> = None;
     /// Whether it stores noise.
     const NOISE: Noise = Noise::No;
     /// Whether it can be written from biases over temperature alone.
@@ -77,6 +94,9 @@ pub trait Target {
 #[derive(Debug, Clone, Args)]
 pub struct Nothing {}
 
+/// Reads the calibration of a file with these bytes and this path; `None` if it is another file.
+pub type Whole = fn(&[u8], &str) -> Option<Result<Calibration>>;
+
 type Make = dyn Fn(&Sources) -> Result<Export>;
 
 /// A [`Target`] among the others.
@@ -91,6 +111,14 @@ pub struct Format {
     pub row: [&'static str; 2],
     /// Its entries of the page.
     pub pages: &'static [Page],
+    pub(crate) convention: Convention,
+    pub(crate) layout: &'static [Entry],
+    pub(crate) not_read: &'static [&'static str],
+    pub(crate) takes_raw: bool,
+    pub(crate) noise_keys: &'static [NoiseKey],
+    pub(crate) rate_key: Option<&'static str>,
+    pub(crate) unpack: Option<fn(&[u8], &str) -> Option<Keyed>>,
+    pub(crate) whole: Option<Whole>,
     about: &'static str,
     augment: fn(Command) -> Command,
     parse: fn(&ArgMatches) -> std::result::Result<Box<Make>, clap::Error>,
@@ -104,6 +132,14 @@ impl Format {
             takes_biases: T::TAKES_BIASES,
             row: [T::CONTENTS, T::READERS],
             pages: T::PAGES,
+            convention: T::CONVENTION,
+            layout: T::LAYOUT,
+            not_read: T::NOT_READ,
+            takes_raw: T::TAKES_RAW,
+            noise_keys: T::NOISE_KEYS,
+            rate_key: T::RATE_KEY,
+            unpack: T::UNPACK,
+            whole: T::WHOLE,
             about: T::ABOUT,
             augment: T::Options::augment_args,
             parse: |matches| {
@@ -111,6 +147,24 @@ impl Format {
                 Ok(Box::new(move |from: &Sources| T::export(from, &options)))
             },
         }
+    }
+
+    /// How many of its keys `file` has.
+    pub(crate) fn count(&self, file: &Keyed) -> usize {
+        let entries = self.layout.iter().map(|entry| entry.key);
+        let keys = entries.chain(self.noise_keys.iter().map(|key| key.key));
+        keys.filter(|key| layout::is_there(key, file)).count()
+    }
+
+    /// This format with the options `arguments`.
+    ///
+    /// # Errors
+    /// The arguments are not options of the format.
+    pub fn chosen(&'static self, arguments: &[String]) -> std::result::Result<Choice, clap::Error> {
+        let command = (self.augment)(Command::new(self.name).no_binary_name(true));
+        let matches = command.try_get_matches_from(arguments)?;
+        let make = (self.parse)(&matches)?;
+        Ok(Choice { format: self, make })
     }
 }
 

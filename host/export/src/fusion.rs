@@ -14,16 +14,16 @@ use std::fmt::Write as _;
 use mimu::calibration::Calibration;
 use mimu::quantity::Sensor;
 use mimu::readable::STANDARD_GRAVITY;
-use mimu_recording::TriadName;
 use mimu_recording::error::Result;
 
 use crate::convention::{Bias, Convention, Shape};
+use crate::layout::{Entry, Numbers};
 use crate::remaining::Places;
 use crate::{Export, Nothing, Page, Sources, Target, body, driver};
 
-/// The only magnetometer with a place.
-const MAG: TriadName = TriadName::MAG;
-/// How it is written.
+/// A degree.
+const DEG: f64 = std::f64::consts::PI / 180.0;
+/// How a magnetometer is written.
 const MAGNETIC: Convention = Convention::to_input(Shape::Whole, Bias::SubtractedFromReadings);
 
 /// The format.
@@ -38,6 +38,21 @@ impl Target for Fusion {
     const CONVENTION: Convention =
         Convention::to_input(Shape::MisalignmentSensitivity, Bias::SubtractedFromReadings);
     const FURTHER_TRIADS: bool = true;
+    const TAKES_RAW: bool = true;
+    const LAYOUT: &[Entry] = &[
+        Entry::of(Sensor::Gyro, Numbers::Left, "gyroscopeMisalignment"),
+        Entry::of(Sensor::Gyro, Numbers::RightDiagonal, "gyroscopeSensitivity").scaled(0.0, DEG),
+        Entry::of(Sensor::Gyro, Numbers::Bias, "gyroscopeOffset"),
+        Entry::of(Sensor::Accel, Numbers::Left, "accelerometerMisalignment"),
+        Entry::of(
+            Sensor::Accel,
+            Numbers::RightDiagonal,
+            "accelerometerSensitivity",
+        )
+        .scaled(0.0, STANDARD_GRAVITY),
+        Entry::of(Sensor::Accel, Numbers::Bias, "accelerometerOffset"),
+    ];
+    const NOT_READ: &[&str] = &["softIronMatrix", "hardIronOffset"];
     const PAGES: &[Page] = &[Page::of("Fusion (x-io)", "fusion.h")];
 
     /// # Errors
@@ -47,9 +62,9 @@ impl Target for Fusion {
         let mut export = Export::new::<Self>(from);
         let raw_unit = calibration.recording.raw_unit;
         let mut body = String::new();
-        for (sensor, name, unit, per_si) in [
-            (Sensor::Gyro, "gyroscope", "deg/s", 1.0_f64.to_degrees()),
-            (Sensor::Accel, "accelerometer", "g", 1.0 / STANDARD_GRAVITY),
+        for (sensor, name, unit) in [
+            (Sensor::Gyro, "gyroscope", "deg/s"),
+            (Sensor::Accel, "accelerometer", "g"),
         ] {
             if calibration.table(sensor).is_none() {
                 export.note(format!("The {sensor} is not calibrated."));
@@ -59,27 +74,14 @@ impl Target for Fusion {
             export.formula(format!(
                 "{name}: calibrated = misalignment * (sensitivity o (raw - offset)), {raw_unit} to {unit}, o by elements; in the frame of the calibration"
             ));
-            let misalignment = parts.left.transpose();
-            let sensitivity = per_si * parts.right.diagonal();
-            let per_raw = format!("{unit} per {raw_unit}");
-            let (matrix, raw) = (misalignment.as_slice(), raw_unit.to_string());
-            let of = |what: &str| format!("{name}{what}");
-            constant(
-                &mut body,
-                "Matrix",
-                &of("Misalignment"),
-                matrix,
-                "1, by rows",
-            );
-            let values = sensitivity.as_slice();
-            constant(&mut body, "Vector", &of("Sensitivity"), values, &per_raw);
-            constant(
-                &mut body,
-                "Vector",
-                &of("Offset"),
-                parts.bias.as_slice(),
-                &raw,
-            );
+            for entry in Self::LAYOUT.iter().filter(|entry| entry.sensor == sensor) {
+                let (kind, unit) = match entry.numbers {
+                    Numbers::Left => ("Matrix", "1, by rows".into()),
+                    Numbers::Bias => ("Vector", raw_unit.to_string()),
+                    _ => ("Vector", format!("{unit} per {raw_unit}")),
+                };
+                constant(&mut body, kind, entry.key, &entry.values(&parts), &unit);
+            }
             body.push('\n');
         }
         magnetometer(calibration, place, &mut body, &mut export)?;
@@ -109,9 +111,7 @@ fn magnetometer(
     out: &mut String,
     export: &mut Export,
 ) -> Result<()> {
-    let others = body::left_out(calibration, |name| name == MAG);
-    export.notes.extend(others);
-    let Some(mag) = calibration.body.iter().find(|triad| triad.triad == MAG) else {
+    let Some(mag) = body::only_mag(calibration, export) else {
         return Ok(());
     };
     let parts = MAGNETIC.of(&body::readings(mag, false, Some(1.0), place)?)?;

@@ -16,6 +16,7 @@ use nalgebra::Vector3;
 
 use crate::convention::{Bias, Convention, Shape};
 use crate::driver::{self, Readings, positive};
+use crate::layout::{Entry, NoiseKey, NoiseOf, Numbers, walk, white};
 use crate::remaining::{Places, Remaining};
 use crate::worst_axis::NoiseOptions;
 use crate::{Export, Noise, Page, Sources, Target, yaml};
@@ -45,6 +46,32 @@ impl Target for Gazebo {
     const READERS: &str = "Gazebo";
     const CONVENTION: Convention = Convention::to_reading(Shape::Absent, Bias::AddedToReadings);
     const NOISE: Noise = Noise::Needed;
+    const LAYOUT: &[Entry] = &[
+        Entry::of(
+            Sensor::Gyro,
+            Numbers::Bias,
+            "angular_velocity/{axis}/noise/mean",
+        ),
+        Entry::of(
+            Sensor::Accel,
+            Numbers::Bias,
+            "linear_acceleration/{axis}/noise/mean",
+        ),
+    ];
+    const NOISE_KEYS: &[NoiseKey] = &[
+        white("angular_velocity/{axis}/noise/stddev", "", Sensor::Gyro).of(NoiseOf::Deviation),
+        white("linear_acceleration/{axis}/noise/stddev", "", Sensor::Accel).of(NoiseOf::Deviation),
+        walk(
+            "angular_velocity/{axis}/noise/dynamic_bias_stddev",
+            "",
+            Sensor::Gyro,
+        ),
+        walk(
+            "linear_acceleration/{axis}/noise/dynamic_bias_stddev",
+            "",
+            Sensor::Accel,
+        ),
+    ];
     const PAGES: &[Page] = &[Page::of("Gazebo", "imu.sdf")];
 
     /// # Errors
@@ -88,7 +115,7 @@ impl Target for Gazebo {
             let _ = writeln!(out, "  <{name}>");
             for (i, axis) in AXES.iter().enumerate() {
                 let density = &axes[sensor][i];
-                let stddev = density.white.value * rate.sqrt();
+                let stddev = NoiseOf::Deviation.number(density.white.value, rate);
                 let [mean, stddev, walk] =
                     [bias[sensor][i], stddev, density.walk.value].map(yaml::number);
                 let _ = writeln!(

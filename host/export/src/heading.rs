@@ -17,7 +17,10 @@ pub(crate) fn of(export: &Export, from: &Sources) -> Vec<String> {
         id.as_ref()
             .map_or_else(String::new, |id| format!("unit {id}, "))
     };
-    let rested = |noise: &NoiseFile| format!("from {:.0} s at rest", noise.duration_s);
+    let rested = |noise: &NoiseFile| match noise.duration_s.is_finite() {
+        true => format!("from {:.0} s at rest", noise.duration_s),
+        false => format!("from {}", noise.place),
+    };
     let mut lines = Vec::new();
     let mut begin = |device: &str, line: String| {
         let (to, version) = (export.to, env!("CARGO_PKG_VERSION"));

@@ -12,12 +12,13 @@
 
 use std::fmt::Write as _;
 
-use mimu::quantity::{AXES, PerSensor, Sensor};
+use mimu::quantity::{PerSensor, Sensor};
 use mimu::readable::STANDARD_GRAVITY;
 use mimu_recording::error::{Argument, Result};
 
 use crate::convention::{Bias, Convention, Shape, within};
-use crate::remaining::{self, Places, Remaining};
+use crate::layout::{Entry, Numbers};
+use crate::remaining::{Places, Remaining};
 use crate::{Export, Page, Sources, Target, driver};
 
 /// One step of the registers, SI.
@@ -56,49 +57,37 @@ impl Target for Iio {
     const CONTENTS: &str = "biases";
     const READERS: &str = "Linux, driver inv_icm42600";
     const CONVENTION: Convention = Convention::to_input(Shape::Absent, Bias::AddedToReadings);
+    const LAYOUT: &[Entry] = &[
+        Entry::of(Sensor::Gyro, Numbers::Bias, "in_anglvel_{axis}_calibbias"),
+        Entry::of(Sensor::Accel, Numbers::Bias, "in_accel_{axis}_calibbias"),
+    ];
     const PAGES: &[Page] = &[Page::of("Linux IIO, inv_icm42600", "calibbias.sh")];
 
     /// # Errors
     /// The calibration is missing, C is singular, or a bias is beyond the range of the chip.
     fn export(from: &Sources, options: &driver::Options) -> Result<Export> {
-        let (calibration, place) = from.calibration()?;
+        let (calibration, _) = from.calibration()?;
         let mut export = Export::new::<Self>(from);
         export.formula("output = scale * raw + calibbias on each axis of the chip, SI; the chip adds calibbias");
         export.leaves(calibration, Places::Axes);
         let mut body = String::new();
-        for (sensor, suffix, channel, argument) in [
-            (Sensor::Gyro, "gyro", "anglvel", Argument::GyroZero),
-            (Sensor::Accel, "accel", "accel", Argument::AccelZero),
-        ] {
-            if calibration.table(sensor).is_none() {
-                export.note(format!(
-                    "The calibration has no {sensor}, so its calibbias stays as it is."
-                ));
-                continue;
-            }
-            let readings = options.readings(calibration, place, sensor)?;
-            export.note(readings.line());
-            let gain = readings.forward.matrix.diagonal();
-            export
-                .remaining
-                .push(remaining::scale_factors(sensor, &gain));
-            export
-                .remaining
-                .push(Remaining::of_rounding(sensor, STEP[sensor]));
-            let _ = writeln!(body, "find_device \"${{1:-i[ci]m4*}}-{suffix}\"");
-            let bias = Self::CONVENTION.of(&readings)?.bias;
-            for (i, axis) in AXES.iter().enumerate() {
-                let name = format!("in_{channel}_{axis}_calibbias");
+        let missing = "its calibbias stays as it is";
+        for (entry, parts) in options.biases::<Self>(from, missing, &mut export)? {
+            let sensor = entry.sensor;
+            let argument = match sensor {
+                Sensor::Gyro => Argument::GyroZero,
+                Sensor::Accel => Argument::AccelZero,
+            };
+            let rounding = Remaining::of_rounding(sensor, STEP[sensor]);
+            export.remaining.push(rounding);
+            let _ = writeln!(body, "find_device \"${{1:-i[ci]m4*}}-{sensor}\"");
+            let keys = entry.written(&parts);
+            for (i, (name, bias)) in keys.iter().enumerate() {
                 let (most, unit) = (MOST * STEP[sensor], format!(" {}", sensor.unit()));
                 let remedy = ("give the zero of the readings", argument);
-                within(
-                    (sensor, i),
-                    &name,
-                    (bias[i], 3, &unit),
-                    [-most, most],
-                    remedy,
-                )?;
-                let _ = writeln!(body, "echo {:.9} > \"$found/{name}\"", bias[i]);
+                let value = (bias[0], 3, unit.as_str());
+                within((sensor, i), name, value, [-most, most], remedy)?;
+                let _ = writeln!(body, "echo {:.9} > \"$found/{name}\"", bias[0]);
             }
         }
         export.temperature(calibration);

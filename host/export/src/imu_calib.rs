@@ -8,6 +8,7 @@ use mimu::quantity::Sensor;
 use mimu_recording::error::Result;
 
 use crate::convention::{Bias, Convention, Shape};
+use crate::layout::{Entry, Numbers};
 use crate::remaining::{Places, Remaining};
 use crate::{Export, Page, Sources, Target, driver, yaml};
 
@@ -21,6 +22,10 @@ impl Target for ImuCalib {
     const CONTENTS: &str = "C and o of the accelerometer";
     const READERS: &str = "the ROS package imu_calib";
     const CONVENTION: Convention = Convention::to_input(Shape::Whole, Bias::SubtractedFromInput);
+    const LAYOUT: &[Entry] = &[
+        Entry::of(Sensor::Accel, Numbers::Left, "SM"),
+        Entry::of(Sensor::Accel, Numbers::Bias, "bias"),
+    ];
     const PAGES: &[Page] = &[Page::of("ROS imu_calib", "imu_calib.yaml")];
 
     /// # Errors
@@ -43,8 +48,9 @@ impl Target for ImuCalib {
         }
         let mut out = export.head("#", from);
         let parts = Self::CONVENTION.of(&readings)?;
-        yaml::list(&mut out, "", "SM", parts.left.transpose().iter().copied());
-        yaml::list(&mut out, "", "bias", parts.bias.iter().copied());
+        for entry in Self::LAYOUT {
+            yaml::list(&mut out, "", entry.key, entry.values(&parts));
+        }
         Ok(export.with(out))
     }
 }

@@ -11,6 +11,8 @@ use mimu::quantity::Sensor;
 use mimu_recording::error::Result;
 
 use crate::convention::{Bias, Convention, Shape};
+use crate::keyed::Keyed;
+use crate::layout::{Entry, Numbers};
 use crate::remaining::Places;
 use crate::{Export, Page, Sources, Target, driver};
 
@@ -42,6 +44,16 @@ impl Target for ImuTk {
     const READERS: &str = "IMU-TK";
     const CONVENTION: Convention =
         Convention::to_input(Shape::MisalignmentSensitivity, Bias::SubtractedFromReadings);
+    const TAKES_RAW: bool = true;
+    const LAYOUT: &[Entry] = &[
+        Entry::of(Sensor::Accel, Numbers::Left, "accel/T"),
+        Entry::of(Sensor::Accel, Numbers::Right, "accel/K"),
+        Entry::of(Sensor::Accel, Numbers::Bias, "accel/B"),
+        Entry::of(Sensor::Gyro, Numbers::Left, "gyro/T"),
+        Entry::of(Sensor::Gyro, Numbers::Right, "gyro/K"),
+        Entry::of(Sensor::Gyro, Numbers::Bias, "gyro/B"),
+    ];
+    const UNPACK: Option<fn(&[u8], &str) -> Option<Keyed>> = Some(unpacked);
     const PAGES: &[Page] = &[
         Page {
             options: "--sensor accel",
@@ -72,17 +84,31 @@ impl Target for ImuTk {
         export.leaves(calibration, Places::Matrix);
         export.remaining.retain(|r| r.sensor == sensor);
         let mut out = String::new();
-        for matrix in [parts.left, parts.right] {
-            for row in matrix.row_iter() {
-                let _ = writeln!(out, "{:.12e} {:.12e} {:.12e}", row[0], row[1], row[2]);
+        for entry in Self::LAYOUT.iter().filter(|entry| entry.sensor == sensor) {
+            let each = if entry.numbers == Numbers::Bias { 1 } else { 3 };
+            for row in entry.values(&parts).chunks(each) {
+                let row: Vec<String> = row.iter().map(|v| format!("{v:.12e}")).collect();
+                let _ = writeln!(out, "{}", row.join(" "));
             }
             out.push('\n');
         }
-        for value in parts.bias.iter() {
-            let _ = writeln!(out, "{value:.12e}");
-        }
-        out.push('\n');
         out += &export.head("#", from);
         Ok(export.with(out))
     }
+}
+
+/// A file of 21 numbers and no keys. It does not say which triad it is of: its comments or its name do.
+fn unpacked(bytes: &[u8], place: &str) -> Option<Keyed> {
+    let file = Keyed::of(std::str::from_utf8(bytes).ok()?);
+    let numbers: [f64; 21] = file.only_numbers()?.try_into().ok()?;
+    let name = place.rsplit(['/', '\\']).next()?.to_lowercase();
+    let triad = match name.contains("gyr") || file.text.contains("gyro: output") {
+        true => "gyro",
+        false => "accel",
+    };
+    let mut unpacked = Keyed::without_keys(file.text.clone());
+    for (key, range) in [("T", 0..9), ("K", 9..18), ("B", 18..21)] {
+        unpacked.add(&format!("{triad}/{key}"), numbers[range].iter().copied());
+    }
+    Some(unpacked)
 }

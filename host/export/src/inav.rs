@@ -7,14 +7,18 @@
 //! Of the compass it computes `(code - magzero) 1024 / maggain` on the axes of the sensor: maggain is the reading for the field, and the output for the field
 //! is 1024. INAV uses its direction only. Source: src/main/sensors/compass.c, `compassUpdate`.
 
+use std::fmt::Display;
+
 use clap::Args;
-use mimu::quantity::AXES;
+use mimu::quantity::{AXES, Sensor};
 use mimu_recording::error::Result;
+use nalgebra::Vector3;
 
 use crate::body::FIELD;
 use crate::convention::{Bias, Convention, Shape};
 use crate::driver::{self, positive};
-use crate::flight_codes::{codes, compass, whole, whole_of_compass};
+use crate::flight_codes::{CODE, CODES, MAG, codes, compass, whole};
+use crate::layout::{Entry, Numbers};
 use crate::{Export, Sources, Target};
 
 /// INAV's gain of a scale factor of 1.
@@ -45,6 +49,11 @@ impl Target for Inav {
     const READERS: &str = "INAV";
     const CONVENTION: Convention = Convention::to_input(Shape::Axes, Bias::SubtractedFromReadings);
     const FURTHER_TRIADS: bool = true;
+    const LAYOUT: &[Entry] = &[
+        Entry::of(Sensor::Accel, Numbers::Bias, "acczero_{axis}").scaled(0.0, CODE),
+        Entry::of(Sensor::Accel, Numbers::LeftDiagonal, "accgain_{axis}").scaled(0.0, 1.0 / UNITY),
+    ];
+    const NOT_READ: &[&str] = &["magzero", "maggain"];
 
     /// # Errors
     /// No accelerometer is calibrated, C is singular, or a number is outside INAV's range.
@@ -64,25 +73,18 @@ impl Target for Inav {
         export.note("Axes have to be those of the sensor, before INAV's alignment of sensor and board: accSmooth of a log has them only if both alignments are 0.");
         export.note("Record with acczero 0 and accgain 4096. Paste the lines into the CLI.");
         export.remaining.push(accel.rounding());
-        let (mut zeros, mut gains) = (String::new(), String::new());
-        for (i, axis) in AXES.iter().enumerate() {
-            let name = format!("acczero_{axis}");
-            let zero = whole(i, &name, accel.zero[i], [-32768, 32767])?;
-            zeros += &format!("set {name} = {zero}\n");
-            let name = format!("accgain_{axis}");
-            let gain = whole(i, &name, UNITY / accel.gain[i], [1, 8192])?;
-            gains += &format!("set {name} = {gain}\n");
-        }
-        let compass = compass_lines(from, &mut export)?;
+        let gain = accel.gain.map(|gain| UNITY / gain);
+        let lines = set(Sensor::Accel, "acczero", &accel.zero, CODES)?
+            + &set(Sensor::Accel, "accgain", &gain, [1, 8192])?
+            + &compass_lines(from, &mut export)?;
         let head = export.head("#", from);
-        Ok(export.with(head + &zeros + &gains + &compass + "save\n"))
+        Ok(export.with(head + &lines + "save\n"))
     }
 }
 
 fn compass_lines(from: &Sources, export: &mut Export) -> Result<String> {
-    let (mut zeros, mut gains) = (String::new(), String::new());
     let Some([zero, gain]) = compass(from, Inav::CONVENTION, export)? else {
-        return Ok(zeros);
+        return Ok(String::new());
     };
     let (calibration, _) = from.calibration()?;
     let in_field = calibration.body.iter().any(|triad| triad.unit == FIELD);
@@ -90,17 +92,22 @@ fn compass_lines(from: &Sources, export: &mut Export) -> Result<String> {
         true => (1.0, "the field".into()),
         false => (TYPICAL_FIELD_UT, format!("{TYPICAL_FIELD_UT} uT")),
     };
-    for (i, axis) in AXES.iter().enumerate() {
-        let name = format!("magzero_{axis}");
-        let value = whole_of_compass(i, &name, zero[i], [-32768, 32767])?;
-        zeros += &format!("set {name} = {value}\n");
-        let name = format!("maggain_{axis}");
-        let value = whole_of_compass(i, &name, field * gain[i], [1, 32767])?;
-        gains += &format!("set {name} = {value}\n");
-    }
     export.formula(format!(
         "mag: output = (code - magzero) 1024 / maggain on each axis of the sensor, 1024 for {words}"
     ));
     export.note("mag: axes have to be those of the sensor, before align_mag, and the codes those with magzero 0 and maggain 1024. Its cross terms have no place.");
-    Ok(zeros + &gains)
+    Ok(set(MAG, "magzero", &zero, CODES)? + &set(MAG, "maggain", &(field * gain), [1, 32767])?)
+}
+
+/// A line of the CLI for each axis.
+fn set(
+    triad: impl Display + Copy,
+    stem: &str,
+    values: &Vector3<f64>,
+    range: [i32; 2],
+) -> Result<String> {
+    let name = |axis: &str| format!("{stem}_{axis}");
+    let all = whole(triad, &name, values, range)?;
+    let line = |(axis, value): (&str, i32)| format!("set {} = {value}\n", name(axis));
+    Ok(AXES.into_iter().zip(all).map(line).collect())
 }

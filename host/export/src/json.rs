@@ -7,7 +7,9 @@ use mimu::calibration::Calibration;
 use mimu_recording::error::{Error, Result};
 use schemars::JsonSchema;
 use serde::Serialize;
+use serde_json::{Map, Value};
 
+use crate::format::Whole;
 use crate::remaining::{Places, Remaining};
 use crate::{Export, Nothing, Page, Sources, Target, heading};
 
@@ -35,6 +37,7 @@ impl Target for Json {
     const CONTENTS: &str = "everything, with the uncertainty";
     const READERS: &str = "any program; [its schema](calibration.schema.json)";
     const FURTHER_TRIADS: bool = true;
+    const WHOLE: Option<Whole> = Some(whole);
     const PAGES: &[Page] = &[Page::of("JSON", "calibration.json")];
 
     /// # Errors
@@ -62,6 +65,22 @@ impl Target for Json {
         })?;
         Ok(export.with(text + "\n"))
     }
+}
+
+/// The calibration of such a file.
+fn whole(bytes: &[u8], place: &str) -> Option<Result<Calibration>> {
+    let mut file: Map<String, Value> = serde_json::from_slice(bytes).ok()?;
+    let format = file.get("format")?.as_str()?;
+    if !format.starts_with("mimu-calibration/") {
+        return None;
+    }
+    for key in ["about", "calibration_errors", "remaining"] {
+        file.remove(key);
+    }
+    let refused = |e: serde_json::Error| Error::new(place, e, "export the calibration again");
+    let read = serde_json::from_value::<Calibration>(file.into()).map_err(refused);
+    // Checked as the text that it is the same as.
+    Some(read.and_then(|read| Calibration::parse(&read.to_toml(), place)))
 }
 
 /// The schema of the file, as text: `docs/calibration.schema.json`.

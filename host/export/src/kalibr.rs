@@ -21,14 +21,14 @@ use std::fmt::Write as _;
 
 use clap::Args;
 use mimu::quantity::{PerSensor, Sensor};
-use mimu_allan::model::Term;
 use mimu_recording::error::Result;
 use nalgebra::{Matrix3, Matrix4};
 
 use crate::convention::{Bias, Convention, Factors, Shape, Triangle};
 use crate::driver::Readings;
 use crate::intrinsics::Intrinsics;
-use crate::worst_axis::{Key, NoiseOptions, lines};
+use crate::layout::{Entry, NoiseKey, Numbers, walk, white};
+use crate::worst_axis::{NoiseOptions, lines};
 use crate::{Export, Noise, Page, Sources, Target, driver, yaml};
 
 /// Options of Kalibr's file.
@@ -61,6 +61,15 @@ impl Target for Kalibr {
         Convention::to_reading(Shape::TriangleRotation(Triangle::Lower), Bias::Absent);
     const NOISE: Noise = Noise::Needed;
     const FURTHER_TRIADS: bool = true;
+    const NOISE_KEYS: &[NoiseKey] = &KEYS;
+    const RATE_KEY: Option<&str> = Some("update_rate");
+    // In the frame of the accelerometer, whose right factor is the identity.
+    const LAYOUT: &[Entry] = &[
+        Entry::of(Sensor::Accel, Numbers::Left, "accelerometers/M"),
+        Entry::of(Sensor::Gyro, Numbers::Left, "gyroscopes/M"),
+        Entry::of(Sensor::Gyro, Numbers::Right, "gyroscopes/C_gyro_i").optional(),
+    ];
+    const NOT_READ: &[&str] = &["gyroscopes/A", "accelerometers/rx_i", "imu1/accelerometers"];
     const PAGES: &[Page] = &[Page::of("Kalibr", "imu.yaml")];
 
     /// # Errors
@@ -75,7 +84,7 @@ impl Target for Kalibr {
             true => ("imu0:\n".to_owned(), "  "),
             false => (String::new(), ""),
         };
-        body += &lines(indent, &KEYS, &densities, |density| density);
+        body += &lines(indent, &KEYS, &densities, f64::NAN);
         let rate = options.noise.rate_hz(noise);
         let topic = serde_json::Value::from(options.rostopic.as_str());
         let _ = writeln!(
@@ -94,12 +103,15 @@ impl Target for Kalibr {
 }
 
 /// The noise keys that Kalibr and OpenVINS share.
-#[rustfmt::skip]
-pub(crate) const KEYS: [Key; 4] = [
-    ("accelerometer_noise_density", "m/s^2/sqrt(Hz)", Sensor::Accel, Term::N),
-    ("accelerometer_random_walk", "m/s^3/sqrt(Hz)", Sensor::Accel, Term::K),
-    ("gyroscope_noise_density", "rad/s/sqrt(Hz)", Sensor::Gyro, Term::N),
-    ("gyroscope_random_walk", "rad/s^2/sqrt(Hz)", Sensor::Gyro, Term::K),
+pub(crate) const KEYS: [NoiseKey; 4] = [
+    white(
+        "accelerometer_noise_density",
+        "m/s^2/sqrt(Hz)",
+        Sensor::Accel,
+    ),
+    walk("accelerometer_random_walk", "m/s^3/sqrt(Hz)", Sensor::Accel),
+    white("gyroscope_noise_density", "rad/s/sqrt(Hz)", Sensor::Gyro),
+    walk("gyroscope_random_walk", "rad/s^2/sqrt(Hz)", Sensor::Gyro),
 ];
 
 impl Kalibr {

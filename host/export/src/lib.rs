@@ -8,6 +8,10 @@
 //! | [`kalibr`], [`openvins`], [`px4`], [`core`] ... | one format each |
 //! | [`format`](mod@format) | what a format declares, and the subcommands |
 //! | [`convention`] | how programs write the model of a triad: direction, factors, sign and place of the bias |
+//! | [`layout`] | where the numbers of a convention, and the noise, are in a file |
+//! | [`keyed`] | the numbers of a text file by their keys, whatever its syntax |
+//! | [`foreign`] | files of other programs, read |
+//! | [`fitting_convention`] | which convention of a file fits a recording of its unit |
 //! | [`driver`] | readings in SI, as converted by a driver |
 //! | [`body`] | triads beyond the first gyro and accelerometer |
 //! | [`worst_axis`] | noise for programs that have one number for three axes |
@@ -31,11 +35,15 @@ pub mod convention;
 pub mod core;
 mod degrees_per_turn;
 pub mod depthai;
+pub mod dlio;
 pub mod driver;
 pub mod fastlio;
+pub mod fitting_convention;
 mod flight_codes;
+pub mod foreign;
 pub mod format;
 pub mod fusion;
+mod gauss_markov;
 pub mod gazebo;
 mod heading;
 pub mod iio;
@@ -46,8 +54,12 @@ pub mod intrinsics;
 pub mod json;
 pub mod judged;
 pub mod kalibr;
+pub mod keyed;
+pub mod kf_gins;
+pub mod layout;
 pub mod liosam;
 pub mod matlab;
+pub mod navego;
 pub mod openvins;
 pub mod orbslam3;
 pub mod parameters;
@@ -75,6 +87,15 @@ use crate::parameters::Parameter;
 use crate::remaining::{Places, Remaining};
 pub use crate::sources::Sources;
 
+/// `text` with the probability of the intervals of `noise` in place of `{}`; empty if it has none.
+pub(crate) fn noise_interval(noise: &NoiseFile, text: &str) -> String {
+    let percent = 100.0 * noise.confidence;
+    match percent.is_finite() {
+        true => text.replace("{}", &percent.to_string()),
+        false => String::new(),
+    }
+}
+
 /// All formats, in the order of `mimu export --help`.
 pub static FORMATS: &[Format] = &[
     Format::of::<c::C>(),
@@ -86,6 +107,9 @@ pub static FORMATS: &[Format] = &[
     Format::of::<orbslam3::OrbSlam3>(),
     Format::of::<liosam::LioSam>(),
     Format::of::<fastlio::FastLio>(),
+    Format::of::<dlio::Dlio>(),
+    Format::of::<kf_gins::KfGins>(),
+    Format::of::<navego::NaveGo>(),
     Format::of::<imu_calib::ImuCalib>(),
     Format::of::<imu_tk::ImuTk>(),
     Format::of::<fusion::Fusion>(),
@@ -183,9 +207,9 @@ impl Export {
 
     /// For a format with continuous-time densities of the worst axis.
     pub(crate) fn continuous_densities(&mut self, noise: &NoiseFile) {
-        let percent = 100.0 * noise.confidence;
+        let interval = noise_interval(noise, "; {} % interval behind each");
         self.formula(format!(
-            "Continuous-time densities of the worst axis; {percent} % interval behind each."
+            "Continuous-time densities of the worst axis{interval}."
         ));
     }
 

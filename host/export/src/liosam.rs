@@ -6,9 +6,9 @@
 
 use clap::Args;
 use mimu::quantity::Sensor::{Accel, Gyro};
-use mimu_allan::model::Term::{K, N};
 use mimu_recording::error::Result;
 
+use crate::layout::{NoiseKey, walk, white};
 use crate::worst_axis::{GravityOptions, WalkOptions, keys_file};
 use crate::{Export, Noise, Page, Sources, Target};
 
@@ -36,6 +36,12 @@ impl Target for LioSam {
     const CONTENTS: &str = "noise, gravity";
     const READERS: &str = "LIO-SAM (`--ros2` for its branch for ROS 2)";
     const NOISE: Noise = Noise::Only;
+    const NOISE_KEYS: &[NoiseKey] = &[
+        white("imuAccNoise", "m/s^2/sqrt(Hz)", Accel),
+        white("imuGyrNoise", "rad/s/sqrt(Hz)", Gyro),
+        walk("imuAccBiasN", "m/s^3/sqrt(Hz)", Accel),
+        walk("imuGyrBiasN", "rad/s^2/sqrt(Hz)", Gyro),
+    ];
     const PAGES: &[Page] = &[Page::of("LIO-SAM", "liosam.yaml")];
 
     /// # Errors
@@ -48,14 +54,8 @@ impl Target for LioSam {
             true => ("/**:\n  ros__parameters:\n", "    "),
             false => ("lio_sam:\n", "  "),
         };
-        let keys = [
-            ("imuAccNoise", "m/s^2/sqrt(Hz)", Accel, N),
-            ("imuGyrNoise", "rad/s/sqrt(Hz)", Gyro, N),
-            ("imuAccBiasN", "m/s^3/sqrt(Hz)", Accel, K),
-            ("imuGyrBiasN", "rad/s^2/sqrt(Hz)", Gyro, K),
-        ];
         let text = ["", layout, indent];
-        let mut export = keys_file(export, from, &options.walks, text, keys, |density| density)?;
+        let mut export = keys_file::<Self>(export, from, (&options.walks, f64::NAN), text)?;
         let gravity = options.gravity.line("imuGravity", from);
         export.content.extend([indent, &gravity].concat().bytes());
         Ok(export)

@@ -11,14 +11,16 @@
 //! Source: Navigation Toolbox, `+fusion/+internal/IMUSensorSimulator.m` (`stepBulkModel`, `setStdDevWhiteNoise`, `setStdDevRandWalk`),
 //! `AccelerometerSimulator.m` (`stepImpl`), `+frames/NED.m` and `ENU.m` (`LinAccelSign`), `SensorParamLoader.m`, `IMUSensorParameters.m`.
 
+use std::f64::consts::{FRAC_1_SQRT_2 as ROOT_HALF, SQRT_2};
+
 use clap::Args;
 use mimu::quantity::Sensor;
-use mimu_recording::TriadKind;
 use mimu_recording::error::Result;
 use serde_json::{Value, json};
 
 use crate::convention::{Bias, Convention, Shape};
 use crate::driver::{self, Readings};
+use crate::layout::{Entry, NoiseKey, Numbers, walk, white};
 use crate::remaining::Places;
 use crate::worst_axis::{Densities, WalkOptions};
 use crate::{Export, Noise, Page, Sources, Target, heading};
@@ -60,6 +62,24 @@ impl Target for Matlab {
     const READERS: &str = "imuSensor of MATLAB";
     const CONVENTION: Convention = Convention::to_reading(Shape::Whole, Bias::AddedToReadings);
     const NOISE: Noise = Noise::Optional;
+    // The accelerometer of imuSensor has the opposite sign of a real one.
+    const LAYOUT: &[Entry] = &[
+        Entry::of(
+            Sensor::Accel,
+            Numbers::Left,
+            "Accelerometer/AxesMisalignment",
+        )
+        .scaled(0.0, 0.01),
+        Entry::of(Sensor::Accel, Numbers::Bias, "Accelerometer/ConstantBias").scaled(0.0, -1.0),
+        Entry::of(Sensor::Gyro, Numbers::Left, "Gyroscope/AxesMisalignment").scaled(0.0, 0.01),
+        Entry::of(Sensor::Gyro, Numbers::Bias, "Gyroscope/ConstantBias"),
+    ];
+    const NOISE_KEYS: &[NoiseKey] = &[
+        white("Accelerometer/NoiseDensity", "", Sensor::Accel).in_si(ROOT_HALF),
+        walk("Accelerometer/RandomWalk", "", Sensor::Accel).in_si(SQRT_2),
+        white("Gyroscope/NoiseDensity", "", Sensor::Gyro).in_si(ROOT_HALF),
+        walk("Gyroscope/RandomWalk", "", Sensor::Gyro).in_si(SQRT_2),
+    ];
     const PAGES: &[Page] = &[Page::of("MATLAB imuSensor", "unit.json")];
 
     /// # Errors
@@ -85,7 +105,7 @@ impl Target for Matlab {
             }
         };
         export.leaves(calibration, Places::Matrix);
-        let triad = |s: Sensor| parameters(&readings[s], noise.as_ref().map(|axes| &axes[s]));
+        let triad = |s: Sensor| parameters(s, &readings[s], noise.as_ref().map(|axes| &axes[s]));
         let (accel, gyro) = (triad(Sensor::Accel)?, triad(Sensor::Gyro)?);
         let mut file = json!({"comment": heading::of(&export, from)});
         file[&options.name] = json!({"Accelerometer": accel, "Gyroscope": gyro});
@@ -93,19 +113,26 @@ impl Target for Matlab {
     }
 }
 
-fn parameters(readings: &Readings, noise: Option<&[Densities; 3]>) -> Result<Value> {
+fn parameters(
+    sensor: Sensor,
+    readings: &Readings,
+    noise: Option<&[Densities; 3]>,
+) -> Result<Value> {
     let parts = Matlab::CONVENTION.of(readings)?;
-    let p = 100.0 * parts.left;
-    let rows: Vec<[f64; 3]> = p.row_iter().map(|row| [row[0], row[1], row[2]]).collect();
-    let bias = match readings.triad.kind {
-        TriadKind::Accel => -parts.bias,
-        _ => parts.bias,
-    };
-    let mut out = json!({"AxesMisalignment": rows, "ConstantBias": bias.as_slice()});
-    if let Some(axes) = noise {
-        let root = f64::sqrt(2.0);
-        out["NoiseDensity"] = json!(axes.each_ref().map(|axis| root * axis.white.value));
-        out["RandomWalk"] = json!(axes.each_ref().map(|axis| axis.walk.value / root));
+    let mut out = json!({});
+    let name = |key: &'static str| key.rsplit('/').next().unwrap_or(key);
+    for entry in Matlab::LAYOUT.iter().filter(|entry| entry.sensor == sensor) {
+        let values = entry.values(&parts);
+        out[name(entry.key)] = match entry.numbers {
+            Numbers::Bias => json!(values),
+            _ => values.chunks(3).map(|row| json!(row)).collect(),
+        };
+    }
+    for key in Matlab::NOISE_KEYS.iter().filter(|key| key.sensor == sensor) {
+        if let Some(axes) = noise {
+            let density = |axis: &Densities| key.number(axis.of(key.term).value, f64::NAN);
+            out[name(key.key)] = json!(axes.each_ref().map(density));
+        }
     }
     Ok(out)
 }

@@ -17,13 +17,14 @@
 use std::fmt::Write as _;
 
 use clap::{Args, ValueEnum};
-use mimu::quantity::PerSensor;
+use mimu::quantity::{PerSensor, Sensor};
 use mimu_recording::error::Result;
 use nalgebra::Matrix4;
 
 use crate::convention::{Bias, Convention, Shape, Triangle};
 use crate::intrinsics::Intrinsics;
 use crate::kalibr::KEYS;
+use crate::layout::{Entry, NoiseKey, Numbers};
 use crate::worst_axis::{NoiseOptions, lines};
 use crate::{Export, Noise, Page, Sources, Target, driver, yaml};
 
@@ -65,6 +66,15 @@ impl Target for OpenVins {
     const CONVENTION: Convention =
         Convention::to_reading(Shape::TriangleRotation(Triangle::Lower), Bias::Absent);
     const NOISE: Noise = Noise::Needed;
+    const NOISE_KEYS: &[NoiseKey] = &KEYS;
+    const RATE_KEY: Option<&str> = Some("update_rate");
+    const LAYOUT: &[Entry] = &[
+        Entry::of(Sensor::Gyro, Numbers::Left, "Tw"),
+        Entry::of(Sensor::Gyro, Numbers::Right, "R_IMUtoGYRO").optional(),
+        Entry::of(Sensor::Accel, Numbers::Left, "Ta"),
+        Entry::of(Sensor::Accel, Numbers::Right, "R_IMUtoACC").optional(),
+    ];
+    const NOT_READ: &[&str] = &["Tg"];
     const PAGES: &[Page] = &[Page::of("OpenVINS", "kalibr_imu_chain.yaml")];
 
     /// # Errors
@@ -92,7 +102,7 @@ impl Target for OpenVins {
         // OpenCV requires the version in the first line.
         let mut out = "%YAML:1.0\n\n".to_owned() + &export.head("#", from) + "\nimu0:\n";
         yaml::matrix(&mut out, "  ", "T_i_b", &Matrix4::identity());
-        out += &lines("  ", &KEYS, &densities, |density| density);
+        out += &lines("  ", &KEYS, &densities, f64::NAN);
         let topic = serde_json::Value::from(options.rostopic.as_str());
         let rate = options.noise.rate_hz(noise);
         let _ = writeln!(

@@ -5,9 +5,9 @@
 //! `IntegrateNewMeasurement`. The reader of settings without `File.version` accepts an integer for the frequency, and only reals for the others.
 
 use mimu::quantity::Sensor::{Accel, Gyro};
-use mimu_allan::model::Term::{K, N};
 use mimu_recording::error::Result;
 
+use crate::layout::{NoiseKey, walk, white};
 use crate::worst_axis::{NoiseOptions, keys_file};
 use crate::{Export, Noise, Page, Sources, Target};
 
@@ -21,6 +21,13 @@ impl Target for OrbSlam3 {
     const CONTENTS: &str = "noise";
     const READERS: &str = "ORB-SLAM3";
     const NOISE: Noise = Noise::Only;
+    const NOISE_KEYS: &[NoiseKey] = &[
+        white("IMU.NoiseGyro", "rad/s/sqrt(Hz)", Gyro),
+        white("IMU.NoiseAcc", "m/s^2/sqrt(Hz)", Accel),
+        walk("IMU.GyroWalk", "rad/s^2/sqrt(Hz)", Gyro),
+        walk("IMU.AccWalk", "m/s^3/sqrt(Hz)", Accel),
+    ];
+    const RATE_KEY: Option<&str> = Some("IMU.Frequency");
     const PAGES: &[Page] = &[Page::of("ORB-SLAM3", "orbslam3.yaml")];
 
     /// # Errors
@@ -31,15 +38,9 @@ impl Target for OrbSlam3 {
         export.continuous_densities(noise);
         export
             .note("Copy these keys into the settings of ORB-SLAM3; IMU.T_b_c1 comes from Kalibr.");
-        let keys = [
-            ("IMU.NoiseGyro", "rad/s/sqrt(Hz)", Gyro, N),
-            ("IMU.NoiseAcc", "m/s^2/sqrt(Hz)", Accel, N),
-            ("IMU.GyroWalk", "rad/s^2/sqrt(Hz)", Gyro, K),
-            ("IMU.AccWalk", "m/s^3/sqrt(Hz)", Accel, K),
-        ];
         let (text, walks) = (["%YAML:1.0\n\n", "", ""], &options.walks);
-        let mut export = keys_file(export, from, walks, text, keys, |density| density)?;
         let rate = options.rate_hz(noise);
+        let mut export = keys_file::<Self>(export, from, (walks, rate), text)?;
         let rate = match (rate - rate.round()).abs() < 0.0005 {
             true => format!("IMU.Frequency: {rate:.0}  # Hz\n"),
             false => format!("IMU.Frequency: {rate:.3}  # Hz\n"),

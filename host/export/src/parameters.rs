@@ -16,7 +16,7 @@ use mimu_recording::{RawUnit, TriadKind, TriadName};
 use nalgebra::{Matrix3, Vector3};
 use serde::Serialize;
 
-use crate::convention::{Bias, Convention, Shape};
+use crate::convention::{Bias, Convention, Shape, within};
 use crate::remaining::{self, Places};
 use crate::{Export, Sources, body, driver, judged};
 
@@ -102,7 +102,7 @@ pub(crate) struct Compass {
     pub symmetric: &'static str,
 }
 
-/// A further triad in the autopilot.
+/// A triad in the autopilot.
 pub(crate) struct FurtherTriad {
     /// The triad.
     pub triad: TriadName,
@@ -114,8 +114,62 @@ pub(crate) struct FurtherTriad {
     pub scale: Matrix3<f64>,
 }
 
-/// A triad, and the offset and factor of each of its axes, SI and SI per SI of the reading.
-pub(crate) type Offsets = (Sensor, Vector3<f64>, Vector3<f64>);
+/// Numbers of a [`FurtherTriad`] that an autopilot has parameters for.
+#[derive(Clone, Copy, PartialEq)]
+pub(crate) enum What {
+    Offset,
+    /// The diagonal of the scale.
+    Scale,
+    /// xy, xz and yz of a symmetric matrix.
+    Beside,
+}
+
+/// A parameter of each axis.
+pub(crate) struct Row {
+    /// The triads that have it.
+    pub kind: TriadKind,
+    /// What it is.
+    pub what: What,
+    /// Its name: `{n}` is the instance, `{axis}` a letter.
+    pub name: &'static str,
+    /// Its range, with the decimals and the unit of the refusal, and what to do then.
+    pub range: Option<([f64; 2], usize, &'static str, Remedy)>,
+}
+
+/// What to do about a number beyond its range.
+pub(crate) type Remedy = (&'static str, Argument);
+
+impl FurtherTriad {
+    /// Adds the parameters of these rows; `number` is the instance in their names.
+    ///
+    /// # Errors
+    /// A value is outside its range.
+    pub fn write<'a>(
+        &self,
+        rows: impl IntoIterator<Item = &'a Row>,
+        number: &str,
+        export: &mut Export,
+    ) -> Result<()> {
+        let s = &self.scale;
+        let own = |row: &&Row| row.kind == self.triad.kind;
+        for row in rows.into_iter().filter(own) {
+            let values = match row.what {
+                What::Offset => self.offset,
+                What::Scale => s.diagonal(),
+                What::Beside => Vector3::new(s[(0, 1)], s[(0, 2)], s[(1, 2)]),
+            };
+            for (i, letter) in LETTERS.iter().enumerate() {
+                let name = row.name.replace("{n}", number).replace("{axis}", letter);
+                if let Some((range, decimals, unit, remedy)) = row.range {
+                    let value = (values[i], decimals, unit);
+                    within((self.triad, i), &name, value, range, remedy)?;
+                }
+                export.parameters.push(Parameter::real(name, values[i]));
+            }
+        }
+        Ok(())
+    }
+}
 
 impl Options {
     /// Device ids, as far as the user knows them. Autopilots store them bit by bit in signed parameters.
@@ -178,11 +232,11 @@ impl Options {
         Ok(())
     }
 
-    /// Those of the calibrated triads; adds formulas, notes and the remaining errors.
+    /// The calibrated triads, SI; adds formulas, notes and the remaining errors.
     ///
     /// # Errors
     /// The calibration is missing, or an error of [`Conversion::of`].
-    pub(crate) fn offsets(&self, from: &Sources, export: &mut Export) -> Result<Vec<Offsets>> {
+    pub(crate) fn offsets(&self, from: &Sources, export: &mut Export) -> Result<Vec<FurtherTriad>> {
         let (calibration, _) = from.calibration()?;
         let known = self.driver.conversions();
         export.formula("x = (v - offset) scale on each axis, raw to SI; v is the driver's output for a raw reading; a gyro has no scale.");
@@ -210,7 +264,12 @@ impl Options {
                 let error = remaining::scale_factors(sensor, &gain);
                 export.remaining.push(error);
             }
-            all.push((sensor, conversion.bias(&forward), gain.map(f64::recip)));
+            all.push(FurtherTriad {
+                triad: driver::name_of(sensor),
+                instance: self.imu,
+                offset: conversion.bias(&forward),
+                scale: Matrix3::from_diagonal(&gain.map(f64::recip)),
+            });
         }
         Ok(all)
     }
@@ -281,7 +340,7 @@ impl Options {
 }
 
 /// What to do about scale factors beyond the range.
-pub(crate) const GIVE_FACTOR: (&str, Argument) = (
+pub(crate) const GIVE_FACTOR: Remedy = (
     "give the factor by which the driver converts",
     Argument::AccelConversion,
 );

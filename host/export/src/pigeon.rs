@@ -11,7 +11,7 @@ use mimu_recording::error::{Argument, Result};
 
 use crate::convention::{Bias, Convention, Shape, within};
 use crate::degrees_per_turn::gains;
-use crate::parameters::LETTERS;
+use crate::layout::{Entry, Numbers};
 use crate::{Export, Page, Sources, Target, driver};
 
 /// Largest number that Phoenix 6 takes, degrees per rotation.
@@ -27,6 +27,9 @@ impl Target for Pigeon {
     const CONTENTS: &str = "scale factors of the gyro";
     const READERS: &str = "Pigeon 2 of CTR Electronics";
     const CONVENTION: Convention = Convention::to_reading(Shape::Axes, Bias::Absent);
+    const LAYOUT: &[Entry] = &[
+        Entry::of(Sensor::Gyro, Numbers::LeftDiagonal, "GyroScalar{AXIS}").scaled(1.0, 1.0 / 360.0),
+    ];
     const PAGES: &[Page] = &[Page::of("Pigeon 2", "pigeon.txt")];
 
     /// # Errors
@@ -34,14 +37,13 @@ impl Target for Pigeon {
     fn export(from: &Sources, options: &driver::Options) -> Result<Export> {
         let mut export = Export::new::<Self>(from);
         export.formula("GyroScalar = 360 (gain - 1), degrees that the Pigeon reads too much in one rotation; gain: reading for a rate of 1");
-        let gain = gains(from, options, Self::CONVENTION, &mut export)?;
+        let parts = gains(from, options, Self::CONVENTION, &mut export)?;
         export.note("Record the rates of the device (getAngularVelocityXDevice and so on), with GyroTrim and MountPose at 0: the numbers belong to the axes of the Pigeon.");
         export.note("`config` is a Pigeon2Configuration; in Python the names are config.gyro_trim.gyro_scalar_x and so on. Phoenix Tuner X takes the same numbers.");
         export.note("The sign is that of CTRE's documentation. Check it by one turn: the error of the yaw has to become smaller.");
         let mut out = export.head("//", from);
-        for (i, letter) in LETTERS.iter().enumerate() {
-            let degrees = 360.0 * (gain[i] - 1.0);
-            let name = format!("GyroScalar{letter}");
+        for (i, (name, degrees)) in Self::LAYOUT[0].written(&parts).iter().enumerate() {
+            let degrees = degrees[0];
             let remedy = (
                 "give the factor by which the readings were converted to rad/s",
                 Argument::GyroConversion,
@@ -49,7 +51,7 @@ impl Target for Pigeon {
             let value = (degrees, 1, " degrees per rotation");
             within(
                 (Sensor::Gyro, i),
-                &name,
+                name,
                 value,
                 [-MOST_DEG, MOST_DEG],
                 remedy,

@@ -17,13 +17,40 @@ use mimu::quantity::Sensor;
 use mimu_recording::TriadKind;
 use mimu_recording::error::{Argument, Result};
 
-use crate::convention::{Bias, Convention, Shape, within};
-use crate::parameters::{CONVENTION, Compass, GIVE_FACTOR, LETTERS, Options, Parameter};
+use crate::convention::{Bias, Convention, Shape};
+use crate::layout::{Entry, Numbers};
+use crate::parameters::{CONVENTION, Compass, GIVE_FACTOR, Options, Parameter, Row, What};
 use crate::remaining::Remaining;
 use crate::{Export, Page, Sources, Target};
 
 /// Range of PX4's scale factors of an accelerometer and of a magnetometer.
 const SCALES: [f64; 2] = [0.1, 3.0];
+/// Its parameters of each axis.
+const ROWS: [Row; 6] = {
+    const fn row(kind: TriadKind, what: What, name: &'static str) -> Row {
+        let range = match (what, kind) {
+            (What::Scale, TriadKind::Mag) => {
+                Some((SCALES, 3, "", (GIVE_FACTOR.0, Argument::MagConversion)))
+            }
+            (What::Scale, _) => Some((SCALES, 3, "", GIVE_FACTOR)),
+            _ => None,
+        };
+        Row {
+            kind,
+            what,
+            name,
+            range,
+        }
+    }
+    [
+        row(TriadKind::Gyro, What::Offset, "CAL_GYRO{n}_{axis}OFF"),
+        row(TriadKind::Accel, What::Offset, "CAL_ACC{n}_{axis}OFF"),
+        row(TriadKind::Accel, What::Scale, "CAL_ACC{n}_{axis}SCALE"),
+        row(TriadKind::Mag, What::Offset, "CAL_MAG{n}_{axis}OFF"),
+        row(TriadKind::Mag, What::Scale, "CAL_MAG{n}_{axis}SCALE"),
+        row(TriadKind::Mag, What::Beside, "CAL_MAG{n}_{axis}ODIAG"),
+    ]
+};
 /// Sensors of a kind.
 const MOST: u8 = 4;
 /// Its magnetometers.
@@ -46,6 +73,14 @@ impl Target for Px4 {
     const CONVENTION: Convention = CONVENTION;
     const TAKES_BIASES: bool = true;
     const FURTHER_TRIADS: bool = true;
+    // Before 2020 a gyro had scale factors too.
+    const LAYOUT: &[Entry] = &[
+        Entry::of(Sensor::Accel, Numbers::Bias, "CAL_ACC0_{AXIS}OFF"),
+        Entry::of(Sensor::Accel, Numbers::LeftDiagonal, "CAL_ACC0_{AXIS}SCALE"),
+        Entry::of(Sensor::Gyro, Numbers::Bias, "CAL_GYRO0_{AXIS}OFF"),
+        Entry::of(Sensor::Gyro, Numbers::LeftDiagonal, "CAL_GYRO0_{AXIS}SCALE").optional(),
+    ];
+    const NOT_READ: &[&str] = &["TC_G0", "TC_A0", "CAL_MAG0", "CAL_ACC1", "CAL_GYRO1"];
     const PAGES: &[Page] = &[Page {
         options: "--qgc",
         ..Page::of("PX4, for QGroundControl", "px4.params")
@@ -120,23 +155,15 @@ fn over_temperature(
 fn at_one_temperature(options: &Options, from: &Sources, export: &mut Export) -> Result<()> {
     let n = options.imu - 1;
     export.note("PX4 subtracts TC_* too: set TC_G_ENABLE and TC_A_ENABLE to 0, unless they come from a calibration without these offsets.");
-    for (sensor, offset, scale) in options.offsets(from, export)? {
-        let prefix = match sensor {
-            Sensor::Gyro => format!("CAL_GYRO{n}"),
-            Sensor::Accel => format!("CAL_ACC{n}"),
+    for of in options.offsets(from, export)? {
+        let (sensor, prefix) = match of.triad.kind {
+            TriadKind::Gyro => (Sensor::Gyro, "CAL_GYRO"),
+            _ => (Sensor::Accel, "CAL_ACC"),
         };
-        let out = &mut export.parameters;
         let id = options.ids()[sensor];
-        out.extend(id.map(|id| Parameter::int32(format!("{prefix}_ID"), id)));
-        let axes = || LETTERS.iter().enumerate();
-        out.extend(
-            axes().map(|(i, letter)| Parameter::real(format!("{prefix}_{letter}OFF"), offset[i])),
-        );
-        for (i, letter) in axes().filter(|_| sensor == Sensor::Accel) {
-            let name = format!("{prefix}_{letter}SCALE");
-            within((sensor, i), &name, (scale[i], 3, ""), SCALES, GIVE_FACTOR)?;
-            out.push(Parameter::real(name, scale[i]));
-        }
+        let id = id.map(|id| Parameter::int32(format!("{prefix}{n}_ID"), id));
+        export.parameters.extend(id);
+        of.write(&ROWS, &n.to_string(), export)?;
     }
     Ok(())
 }
@@ -153,27 +180,8 @@ fn further(options: &Options, from: &Sources, export: &mut Export) -> Result<()>
         };
         let prefix = format!("{stem}{}", of.instance - 1);
         ids.push(format!("{prefix}_ID"));
-        let axes = || LETTERS.iter().enumerate();
-        let real = |what: &str, letter: &str, value| {
-            Parameter::real(format!("{prefix}_{letter}{what}"), value)
-        };
-        let out = &mut export.parameters;
-        out.extend(axes().map(|(i, letter)| real("OFF", letter, of.offset[i])));
-        if of.triad.kind == TriadKind::Gyro {
-            continue;
-        }
-        let remedy = match of.triad.kind {
-            TriadKind::Mag => (GIVE_FACTOR.0, Argument::MagConversion),
-            _ => GIVE_FACTOR,
-        };
-        for (i, letter) in axes() {
-            let (name, scale) = (format!("{prefix}_{letter}SCALE"), of.scale[(i, i)]);
-            within((of.triad, i), &name, (scale, 3, ""), SCALES, remedy)?;
-            out.push(Parameter::real(name, scale));
-        }
+        of.write(&ROWS, &(of.instance - 1).to_string(), export)?;
         if of.triad.kind == TriadKind::Mag {
-            let off = [of.scale[(0, 1)], of.scale[(0, 2)], of.scale[(1, 2)]];
-            out.extend(axes().map(|(i, letter)| real("ODIAG", letter, off[i])));
             export.note(format!(
                 "{}: for an external compass, {prefix}_ROT 100 with {prefix}_ROLL, _PITCH and _YAW sets such a mounting.",
                 of.triad

@@ -12,10 +12,13 @@
 
 use clap::{Args, ValueEnum};
 use crc::{CRC_32_ISO_HDLC, Crc};
+use mimu::quantity::Sensor;
 use mimu_recording::error::Result;
 use serde_json::json;
 
 use crate::convention::{Bias, Convention, Parts, Shape};
+use crate::keyed::Keyed;
+use crate::layout::{Entry, Numbers};
 use crate::remaining::Places;
 use crate::{Export, Page, Sources, Target, driver, heading};
 
@@ -57,6 +60,21 @@ impl Target for RealSense {
     const READERS: &str =
         "RealSense cameras of the D400 family with an inertial unit, such as the D435i";
     const CONVENTION: Convention = Convention::to_input(Shape::Whole, Bias::SubtractedFromInput);
+    const LAYOUT: &[Entry] = &[
+        Entry::of(
+            Sensor::Accel,
+            Numbers::LeftByColumns,
+            "accelerometer/scale_and_alignment",
+        ),
+        Entry::of(Sensor::Accel, Numbers::Bias, "accelerometer/bias"),
+        Entry::of(
+            Sensor::Gyro,
+            Numbers::LeftByColumns,
+            "gyroscope/scale_and_alignment",
+        ),
+        Entry::of(Sensor::Gyro, Numbers::Bias, "gyroscope/bias"),
+    ];
+    const UNPACK: Option<fn(&[u8], &str) -> Option<Keyed>> = Some(unpacked);
     const PAGES: &[Page] = &[
         Page::of("RealSense, EEPROM", "realsense.bin"),
         Page {
@@ -128,4 +146,27 @@ fn with_header(version: [u8; 2], kind: u16, content: Vec<u8>) -> Vec<u8> {
     out.extend(CRC.checksum(&content).to_le_bytes());
     out.extend(content);
     out
+}
+
+/// The intrinsics of an EEPROM: the numbers behind its three headers, four flags and 48 bytes.
+fn unpacked(bytes: &[u8], _: &str) -> Option<Keyed> {
+    const FIRST: usize = 3 * HEADER + 4 + 48;
+    let checked = (bytes.len() == BYTES).then(|| CRC.checksum(&bytes[HEADER..]).to_le_bytes());
+    if checked? != bytes[HEADER - 4..HEADER] {
+        return None;
+    }
+    let words = bytes[FIRST..FIRST + 96].chunks(4);
+    let number = |word: &[u8]| Some(f64::from(f32::from_le_bytes(word.try_into().ok()?)));
+    let numbers: Vec<f64> = words.map(number).collect::<Option<_>>()?;
+    let mut file = Keyed::default();
+    for (entry, range) in RealSense::LAYOUT.iter().zip([0..9, 9..12, 12..21, 21..24]) {
+        let is_in_degrees = range == (21..24);
+        let unit = if is_in_degrees {
+            1f64.to_radians()
+        } else {
+            1.0
+        };
+        file.add(entry.key, numbers[range].iter().map(|v| v * unit));
+    }
+    Some(file)
 }

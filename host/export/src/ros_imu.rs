@@ -7,6 +7,7 @@
 use mimu::quantity::{PerSensor, Sensor};
 use mimu_recording::error::Result;
 
+use crate::layout::{NoiseKey, NoiseOf, white};
 use crate::worst_axis::NoiseOptions;
 use crate::{Export, Noise, Page, Sources, Target, yaml};
 
@@ -20,6 +21,10 @@ impl Target for RosImu {
     const CONTENTS: &str = "variances of one sample";
     const READERS: &str = "nodes that publish `sensor_msgs/Imu`";
     const NOISE: Noise = Noise::Only;
+    const NOISE_KEYS: &[NoiseKey] = &[
+        white("angular_velocity_covariance", "", Sensor::Gyro).of(NoiseOf::Variance),
+        white("linear_acceleration_covariance", "", Sensor::Accel).of(NoiseOf::Variance),
+    ];
     const PAGES: &[Page] = &[Page::of("ROS, sensor_msgs/Imu", "covariances.yaml")];
 
     /// # Errors
@@ -39,15 +44,12 @@ impl Target for RosImu {
         let mut orientation = [0.0; 9];
         orientation[0] = -1.0;
         yaml::list(&mut out, "", "orientation_covariance", orientation);
-        for (key, sensor) in [
-            ("angular_velocity_covariance", Sensor::Gyro),
-            ("linear_acceleration_covariance", Sensor::Accel),
-        ] {
+        for key in Self::NOISE_KEYS {
             let mut covariance = [0.0; 9];
-            for (i, axis) in axes[sensor].iter().enumerate() {
-                covariance[4 * i] = axis.white.value.powi(2) * rate;
+            for (i, axis) in axes[key.sensor].iter().enumerate() {
+                covariance[4 * i] = key.number(axis.white.value, rate);
             }
-            yaml::list(&mut out, "", key, covariance);
+            yaml::list(&mut out, "", key.key, covariance);
         }
         Ok(export.with(out))
     }

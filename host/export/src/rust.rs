@@ -7,17 +7,20 @@
 //! results match the device's to the last bit.
 
 use mimu::calibration::body::BodyTriad;
-use mimu::calibration::reference_node;
-use mimu::quantity::Sensor;
+use mimu::calibration::{Calibration, DeviceCalibration, reference_node};
+use mimu::quantity::{PerSensor, Sensor};
 use mimu_core::compensation::{Affine, Compensation};
 use mimu_core::effects::{DeviceEffect, Directions, Variable};
 use mimu_core::stored;
 use mimu_core::table::Node;
 use mimu_device::Image;
 use mimu_recording::error::{Error, Result};
-use nalgebra::Matrix3;
+use mimu_recording::{RawUnit, UNNAMED};
+use nalgebra::{Matrix3, Vector3};
 use serde_json::{Value, json};
 
+use crate::format::Whole;
+use crate::keyed::Keyed;
 use crate::remaining::Places;
 use crate::template::fill;
 use crate::{Export, Nothing, Page, Sources, Target};
@@ -32,6 +35,7 @@ impl Target for Rust {
     const CONTENTS: &str = "everything, as constants";
     const READERS: &str = "Rust programs with `mimu-core`";
     const FURTHER_TRIADS: bool = true;
+    const WHOLE: Option<Whole> = Some(whole);
     const PAGES: &[Page] = &[Page::of("Rust with mimu-core", "calibration.rs")];
 
     /// # Errors
@@ -155,4 +159,45 @@ fn rows(matrix: &Matrix3<f32>) -> String {
 
 fn list(values: &[f32]) -> String {
     format!("{values:?}")
+}
+
+/// The calibration of such a file. Its effects are calls, which are not read.
+fn whole(bytes: &[u8], place: &str) -> Option<Result<Calibration>> {
+    let file = Keyed::of(std::str::from_utf8(bytes).ok()?);
+    let numbers = file
+        .numbers("NODE")
+        .filter(|_| file.text.contains("mimu_core"))?;
+    let affine = |of: &[f64]| Affine {
+        matrix: Matrix3::from_row_slice(&of[..9]).cast(),
+        offset: Vector3::from_column_slice(&of[9..12]).cast(),
+    };
+    let both = |of: &[f64]| PerSensor::from([affine(&of[..12]), affine(&of[12..])]);
+    let nodes = numbers.chunks_exact(49).map(|of| Node {
+        temp_c: of[0] as f32,
+        model: both(&of[1..25]),
+        slope: both(&of[25..]),
+    });
+    if file.text.contains("DeviceEffect") || file.text.contains("Some(PerSensor::from") {
+        let problem = "its effects and lags are program text, which is not read";
+        let remedy = "give the calibration file, or its bytes: mimu export core";
+        return Some(Err(Error::new(place, problem, remedy)));
+    }
+    let units = [RawUnit::Volt, RawUnit::Count].into_iter();
+    let mut named = units.filter(|unit| file.text.contains(&format!("readings in {unit},")));
+    Some(Calibration::of_device(
+        &DeviceCalibration {
+            device: UNNAMED.into(),
+            unit_id: None,
+            sensors: None,
+            raw_unit: named.next().unwrap_or(RawUnit::Volt),
+            created: None,
+            trimmed: None,
+            sha256: None,
+            nodes: nodes.collect(),
+            range_c: None,
+            lags_s: None,
+            effects: Vec::new(),
+        },
+        place,
+    ))
 }

@@ -7,11 +7,12 @@
 //! Source: jitingcn/SlimeVR-Tracker-nRF, src/console.c, `command_sens`; src/sensor/sensor.c; Kconfig, SENSOR_SENS_REV (2025-11).
 
 use clap::Args;
-use mimu::quantity::AXES;
+use mimu::quantity::{AXES, Sensor};
 use mimu_recording::error::{Argument, Error, Result};
 
 use crate::convention::{Bias, Convention, Shape};
 use crate::degrees_per_turn::gains;
+use crate::layout::{Entry, Numbers};
 use crate::{Export, Page, Sources, Target, driver};
 
 /// Options of the line.
@@ -38,6 +39,8 @@ impl Target for SlimeNrf {
     const CONTENTS: &str = "scale factors of the gyro";
     const READERS: &str = "SlimeVR trackers with SlimeNRF";
     const CONVENTION: Convention = Convention::to_reading(Shape::Axes, Bias::Absent);
+    const LAYOUT: &[Entry] =
+        &[Entry::of(Sensor::Gyro, Numbers::LeftDiagonal, "sens").scaled(1.0, -1.0 / 720.0)];
     const PAGES: &[Page] = &[Page::of("SlimeVR tracker (SlimeNRF)", "sens.txt")];
 
     /// # Errors
@@ -48,7 +51,8 @@ impl Target for SlimeNrf {
         export.formula(format!(
             "rate = reading / (1 - degrees / (360 * {turns})) on each axis of the sensor, after the tracker's own bias"
         ));
-        let gain = gains(from, &options.driver, Self::CONVENTION, &mut export)?;
+        let parts = gains(from, &options.driver, Self::CONVENTION, &mut export)?;
+        let gain = parts.left.diagonal();
         for (axis, gain) in AXES.iter().zip(gain.iter()) {
             if !((gain - 1.0).abs() <= MOST) {
                 return Err(Error::new(

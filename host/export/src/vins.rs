@@ -13,11 +13,11 @@
 
 use clap::Args;
 use mimu::quantity::Sensor::{Accel, Gyro};
-use mimu_allan::model::Term::{K, N};
 use mimu_recording::error::Result;
 
+use crate::layout::{NoiseKey, NoiseOf, walk, white};
 use crate::worst_axis::{GravityOptions, NoiseOptions, keys_file};
-use crate::{Export, Noise, Page, Sources, Target};
+use crate::{Export, Noise, Page, Sources, Target, noise_interval};
 
 /// Options of the file.
 #[derive(Debug, Clone, Args)]
@@ -40,6 +40,12 @@ impl Target for Vins {
     const CONTENTS: &str = "noise of one sample, gravity";
     const READERS: &str = "VINS-Fusion, VINS-Mono";
     const NOISE: Noise = Noise::Only;
+    const NOISE_KEYS: &[NoiseKey] = &[
+        white("acc_n", "m/s^2", Accel).of(NoiseOf::Deviation),
+        white("gyr_n", "rad/s", Gyro).of(NoiseOf::Deviation),
+        walk("acc_w", "m/s^3", Accel).of(NoiseOf::Deviation),
+        walk("gyr_w", "rad/s^2", Gyro).of(NoiseOf::Deviation),
+    ];
     const PAGES: &[Page] = &[Page::of("VINS-Fusion", "vins.yaml")];
 
     /// # Errors
@@ -49,21 +55,13 @@ impl Target for Vins {
         let rate = options.noise.rate_hz(noise);
         let mut export = Export::new::<Self>(from);
         export.formula(format!(
-            "Of one sample at {rate:.3} Hz: acc_n = N sqrt(rate), acc_w = K sqrt(rate), and so for the gyro; the worst axis, with the {} % interval behind each.",
-            100.0 * noise.confidence
+            "Of one sample at {rate:.3} Hz: acc_n = N sqrt(rate), acc_w = K sqrt(rate), and so for the gyro; the worst axis{}.",
+            noise_interval(noise, ", with the {} % interval behind each")
         ));
         export.note("VINS treats the two readings at the ends of an interval as independent. Multiplied by 1.41, acc_n and gyr_n give the right covariance.");
         export.note("Copy these keys into the configuration of VINS; its other keys are those of cameras and tracking.");
-        let keys = [
-            ("acc_n", "m/s^2", Accel, N),
-            ("gyr_n", "rad/s", Gyro, N),
-            ("acc_w", "m/s^3", Accel, K),
-            ("gyr_w", "rad/s^2", Gyro, K),
-        ];
         let text = ["%YAML:1.0\n\n", "", ""];
-        let mut export = keys_file(export, from, &options.noise.walks, text, keys, |density| {
-            density * rate.sqrt()
-        })?;
+        let mut export = keys_file::<Self>(export, from, (&options.noise.walks, rate), text)?;
         export
             .content
             .extend(options.gravity.line("g_norm", from).bytes());

@@ -13,8 +13,9 @@ use mimu::readable::STANDARD_GRAVITY;
 use mimu_allan::model::Term;
 use mimu_recording::error::{Argument, Error, Result};
 
-use crate::driver::positive;
-use crate::{Export, Sources, yaml};
+use crate::driver::{self, positive};
+use crate::layout::NoiseKey;
+use crate::{Export, Sources, Target, yaml};
 
 /// Options of the random walks, the same for all programs.
 #[derive(Debug, Clone, Default, Args)]
@@ -36,6 +37,17 @@ pub struct NoiseOptions {
     /// Random walks.
     #[command(flatten)]
     pub walks: WalkOptions,
+}
+
+/// Options of programs that take noise and readings of a driver.
+#[derive(Debug, Clone, Default, Args)]
+pub struct NoiseAndDriver {
+    /// Options common to all noise files.
+    #[command(flatten)]
+    pub noise: NoiseOptions,
+    /// The driver's conversion.
+    #[command(flatten)]
+    pub driver: driver::Options,
 }
 
 /// Option of programs that take local gravity with the noise.
@@ -66,6 +78,16 @@ pub struct Densities {
     pub white: Worst,
     /// K, rad/s²/√Hz or m/s³/√Hz.
     pub walk: Worst,
+}
+
+impl Densities {
+    /// N, or else K.
+    pub fn of(&self, term: Term) -> &Worst {
+        match term {
+            Term::N => &self.white,
+            _ => &self.walk,
+        }
+    }
 }
 
 impl NoiseOptions {
@@ -178,40 +200,32 @@ impl WalkOptions {
     }
 }
 
-/// A key of a program's configuration: its name and unit, and the sensor and term of the density that it follows from.
-pub(crate) type Key = (&'static str, &'static str, Sensor, Term);
-
-/// The file of a program that takes the noise of calibrated readings and nothing else: `before` the comments, then `body`, and a line for each key, whose
-/// number `convert` makes of the density.
+/// The file of a program that takes the noise of calibrated readings and nothing else: `before` the comments, then `body`, and a line for each key, for
+/// messages at `rate_hz`.
 ///
 /// # Errors
 /// Those of [`WalkOptions::densities`].
-pub(crate) fn keys_file(
+pub(crate) fn keys_file<T: Target>(
     mut export: Export,
     from: &Sources,
-    walks: &WalkOptions,
+    (walks, rate_hz): (&WalkOptions, f64),
     [before, body, indent]: [&str; 3],
-    keys: [Key; 4],
-    convert: impl Fn(f64) -> f64,
 ) -> Result<Export> {
     let densities = walks.densities(from.noise()?, &PerSensor::both([1.0; 3]))?;
     export.needs_calibrated(from);
-    let lines = lines(indent, &keys, &densities, convert);
+    let lines = lines(indent, T::NOISE_KEYS, &densities, rate_hz);
     let head = export.head("#", from);
     Ok(export.with([before, &head, body, &lines].concat()))
 }
 
-/// A line of YAML for each key, whose number `convert` makes of the density.
+/// A line of YAML for each key, for messages at `rate_hz`.
 pub(crate) fn lines(
     indent: &str,
-    keys: &[Key],
+    keys: &[NoiseKey],
     densities: &PerSensor<Densities>,
-    convert: impl Fn(f64) -> f64,
+    rate_hz: f64,
 ) -> String {
-    let of = |(key, unit, sensor, term): &Key| match term {
-        Term::N => line(indent, key, &convert, unit, &densities[*sensor].white),
-        _ => line(indent, key, &convert, unit, &densities[*sensor].walk),
-    };
+    let of = |key: &NoiseKey| line(indent, key, densities[key.sensor].of(key.term), rate_hz);
     keys.iter().map(of).collect()
 }
 
@@ -223,16 +237,18 @@ pub(crate) fn instability(noise: &NoiseFile, sensor: Sensor, axis: &str) -> Opti
     all.reduce(f64::max)
 }
 
-/// A line of YAML: the value that a program takes, which `convert` makes of the density `from`, its unit, and its interval in the same unit.
-fn line(indent: &str, key: &str, convert: impl Fn(f64) -> f64, unit: &str, from: &Worst) -> String {
-    let value = yaml::scientific(convert(from.value), 6);
+/// A line of YAML: the number that a program takes of the density `from`, its unit, and its interval in the same unit.
+fn line(indent: &str, key: &NoiseKey, from: &Worst, rate_hz: f64) -> String {
+    let number = |density| key.number(density, rate_hz);
+    let value = yaml::scientific(number(from.value), 6);
     let mut comment = from.origin.clone();
-    if let Some([lower, upper]) = from.interval.map(|ends| ends.map(&convert)) {
+    if let Some([lower, upper]) = from.interval.map(|ends| ends.map(number)) {
         comment += &format!(": {lower:.2e} to {upper:.2e}");
     }
     if let Some(remark) = &from.remark {
         comment += &format!("; {remark}");
     }
+    let (key, unit) = (key.key, key.unit);
     format!("{indent}{key}: {value}  # {unit}, {comment}\n")
 }
 
@@ -264,7 +280,9 @@ fn worst(
         let (value, interval, origin) = match (channel.get(term), channel.k_at_most) {
             (Ok(c), _) => {
                 let ends = [gain * c.lower, gain * c.upper];
-                (gain * c.value, Some(ends), name.clone())
+                // The noise of another program's file has none.
+                let known = ends.iter().all(|end| end.is_finite());
+                (gain * c.value, known.then_some(ends), name.clone())
             }
             (Err(_), Some(bound)) if term == Term::K && fallback.is_none() => {
                 let origin = format!("{name}: not seen, the upper end of its interval");

@@ -79,8 +79,8 @@ const HEADER_OF_CURVES: &str = "\
 ";
 
 const HEADER_OF_KEPT: &str = "\
-# Fetched from a device, which stores no standard deviations, no covariance and no error figures: its uncertainty is unknown.
-# Numbers have single precision. temp_c is the temperature at which the device lists it, in degrees Celsius.
+# From a device or another program's file, which stores no standard deviations, no covariance and no error figures: its uncertainty is unknown.
+# Numbers of a device have single precision. temp_c is the temperature at which the device lists it, in degrees Celsius.
 ";
 
 const HEADER_OF_SESSIONS: &str = "\

@@ -25,6 +25,7 @@ use mimu_station::scale::{Ranges, Scale};
 use crate::arguments::{JsonArgs, VerboseArgs, number};
 use crate::cmd::device::{duration, side};
 use crate::cmd::wizard::TextArgs;
+use crate::opening;
 use crate::output::{check_outputs, now, print, show};
 use crate::reading::LogArgs;
 use crate::report::{accept_line, accept_text};
@@ -178,7 +179,7 @@ impl<'a> Station<'a> {
             let remedy = "give --limits FILE, the data sheet, --part icm42688p, or the units of the same kind, --prior FILE";
             return Err(Error::new("accept", problem, remedy));
         }
-        let read = |path: &Option<PathBuf>| path.as_deref().map(Calibration::read).transpose();
+        let read = |path: &Option<PathBuf>| path.as_deref().map(opening::calibration).transpose();
         let calibration = read(&args.calibration)?;
         if let (Some(of), Some(path)) = (&calibration, &args.calibration) {
             check_judgement(of, path)?;

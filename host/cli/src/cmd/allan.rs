@@ -2,10 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::opening;
 use crate::report;
 use crate::report::allan_plot as plot;
 use clap::{Args, ValueEnum};
-use mimu::calibration::Calibration;
 use mimu::result::allan::AllanResult;
 use mimu::survey::{Options, Part, survey_all};
 use mimu_allan::Deviation;
@@ -14,7 +14,7 @@ use mimu_recording::{MANIFEST_FILE, Recording};
 
 use crate::arguments::{JsonArgs, StrictArgs, VerboseArgs, number};
 use crate::hint::OF_A_LOG;
-use crate::output::{Results, check_outputs, now, progress};
+use crate::output::{Results, check_outputs, check_overwritten, now, progress};
 use crate::reading::{LogArgs, open};
 use crate::status::Status;
 
@@ -147,10 +147,11 @@ pub fn run(args: &AllanArgs) -> Result<Status> {
         args.json.file(),
     ];
     check_outputs(&outputs, &inputs)?;
+    check_overwritten(&[args.output.as_deref()])?;
     let calibration = args
         .calibration
         .as_deref()
-        .map(Calibration::read)
+        .map(opening::calibration)
         .transpose()?;
     let bar = progress("reading and averaging");
     let surveys = survey_all(&recordings, calibration.as_ref(), options, |share| {

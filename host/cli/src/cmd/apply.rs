@@ -3,13 +3,13 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use mimu::calibration::Calibration;
 use mimu::calibration::apply::{Applied, Compensated, apply};
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{CopiedTable, MANIFEST_FILE, Recording, ReplacedTriad, SampleFormat};
 
 use crate::arguments::JsonArgs;
 use crate::hint::OF_A_LOG;
+use crate::opening::{Opened, open as open_calibration};
 use crate::output::{check_outputs, print, progress};
 use crate::reading::{LogArgs, imported_to, named, open};
 use crate::report;
@@ -37,21 +37,22 @@ pub(crate) struct ApplyArgs {
 }
 
 pub(crate) fn run(args: &ApplyArgs) -> Result<()> {
-    let calibration = Calibration::read(&args.calibration)?;
+    let calibration = open_calibration(&args.calibration)?;
     let is_table = args
         .output
         .extension()
         .is_some_and(|ending| ending.eq_ignore_ascii_case("csv"));
     let applied = match args.recording.is_file() && is_table {
-        true => copied(args, &calibration)?,
-        false => written(args, &calibration)?,
+        true => copied(args, calibration)?,
+        false => written(args, calibration)?,
     };
     print(&args.json, &report::apply_text(&applied), &applied, None)
 }
 
 /// Writes a recording.
-fn written(args: &ApplyArgs, calibration: &Calibration) -> Result<Applied> {
+fn written(args: &ApplyArgs, calibration: Opened) -> Result<Applied> {
     let recording = open(&args.recording, &args.log)?;
+    let calibration = calibration.of_readings(recording.manifest.raw_unit)?;
     let manifest = args.recording.join(MANIFEST_FILE);
     let inputs = [
         manifest.as_path(),
@@ -63,7 +64,7 @@ fn written(args: &ApplyArgs, calibration: &Calibration) -> Result<Applied> {
     let bar = progress("compensating");
     let done = apply(
         &recording,
-        calibration,
+        &calibration,
         &args.output,
         args.format,
         args.replace,
@@ -74,7 +75,7 @@ fn written(args: &ApplyArgs, calibration: &Calibration) -> Result<Applied> {
 }
 
 /// Writes a copy of a text file, with its readings compensated: stamps and all other columns stay as they are.
-fn copied(args: &ApplyArgs, calibration: &Calibration) -> Result<Applied> {
+fn copied(args: &ApplyArgs, calibration: Opened) -> Result<Applied> {
     if args.output.exists() && !args.replace {
         let error = Error::new(
             args.output.display(),
@@ -87,9 +88,10 @@ fn copied(args: &ApplyArgs, calibration: &Calibration) -> Result<Applied> {
     check_outputs(&outputs, &[&args.calibration, &args.recording])?;
     let (folder, options) = imported_to(&args.recording, &args.log)?;
     let recording = named(Recording::open(&folder)?, &args.recording);
+    let calibration = calibration.of_readings(recording.manifest.raw_unit)?;
     let bar = progress("compensating");
     let mut compensated =
-        Compensated::new(&recording, calibration, |share| bar.reach(0.5 * share))?;
+        Compensated::new(&recording, &calibration, |share| bar.reach(0.5 * share))?;
     let replaced = compensated.units().map(|(triad, unit)| ReplacedTriad {
         triad,
         unit: unit.to_owned(),

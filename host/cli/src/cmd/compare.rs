@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use mimu::calibration::Calibration;
 use mimu::calibration::comparison::compare;
 use mimu_recording::error::Result;
 
 use crate::arguments::{JsonArgs, VerboseArgs};
+use crate::opening;
 use crate::output::print;
 use crate::report::compare_text;
 
@@ -23,7 +23,7 @@ pub struct CompareArgs {
 }
 
 pub fn run(args: &CompareArgs) -> Result<()> {
-    let read = |path: &PathBuf| Ok((path.display().to_string(), Calibration::read(path)?));
+    let read = |path: &PathBuf| Ok((path.display().to_string(), opening::calibration(path)?));
     let all: Vec<_> = args.files.iter().map(read).collect::<Result<_>>()?;
     let result = compare(&all)?;
     print(

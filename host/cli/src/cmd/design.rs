@@ -20,7 +20,7 @@ use nalgebra::Vector3;
 use serde::Serialize;
 
 use crate::arguments::{JsonArgs, SensorArg, VerboseArgs, number};
-use crate::output::{Results, check_outputs};
+use crate::output::{Results, check_outputs, check_overwritten};
 use crate::report;
 use noise::NoiseArg;
 
@@ -293,6 +293,7 @@ pub fn run(args: &DesignArgs) -> Result<()> {
         .map(PathBuf::as_path)
         .collect();
     check_outputs(&[args.output.as_deref(), args.json.file()], &stated)?;
+    check_overwritten(&[args.output.as_deref()])?;
     let (made, plan) = args.made()?;
     let mut out = Results::new(made.text(args.verbose.verbose));
     out.file("plan", args.output.as_ref(), || Ok(plan))?;

@@ -3,9 +3,9 @@
 use std::cell::RefCell;
 use std::path::PathBuf;
 
+use crate::opening;
 use crate::report::{self, Made};
 use clap::Args;
-use mimu::calibration::Calibration;
 use mimu::diagnose::Recordings;
 use mimu::diagnosed::{Diagnosed, diagnosed};
 use mimu::noise::noise_file::NoiseFile;
@@ -138,7 +138,7 @@ pub fn run(args: &DiagnoseArgs, command_line: &str) -> Result<Status> {
         };
         args.opened(&read, noise.as_ref())
     };
-    let given = args.calibration.as_deref().map(Calibration::read);
+    let given = args.calibration.as_deref().map(opening::calibration);
     let given = given.transpose()?;
     let all: Result<Vec<Prepared>> = args.recordings.iter().map(open).collect();
     let mut all = all?;

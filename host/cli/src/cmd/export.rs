@@ -13,7 +13,7 @@ use mimu_recording::result_file::stage;
 use serde::Serialize;
 
 use crate::arguments::JsonArgs;
-use crate::output::{check_outputs, print};
+use crate::output::{check_outputs, check_overwritten, print};
 
 #[derive(Args)]
 #[command(subcommand_value_name = "FORMAT", subcommand_help_heading = "Formats")]
@@ -118,6 +118,7 @@ pub fn run(args: &ExportArgs) -> Result<()> {
         .map(PathBuf::as_path)
         .collect();
     check_outputs(&[Some(path), args.json.file()], &inputs)?;
+    check_overwritten(&[Some(path)])?;
     let named = file.map(|p| p.display().to_string());
     let (mut calibration, mut biases) = (None, None);
     if let (Some(path), Some(place)) = (file, &named) {
@@ -133,7 +134,12 @@ pub fn run(args: &ExportArgs) -> Result<()> {
         biases: biases.as_ref(),
         noise: noise.as_ref(),
     };
-    let export = choice.export(&from)?;
+    written(choice, &from, path, &args.json)
+}
+
+/// Writes the export of `from`, and prints what it contains.
+pub(super) fn written(choice: &Choice, from: &Sources, path: &Path, json: &JsonArgs) -> Result<()> {
+    let export = choice.export(from)?;
     let content = export.content.clone();
     let result = ExportResult {
         file: path.display().to_string(),
@@ -143,5 +149,5 @@ pub fn run(args: &ExportArgs) -> Result<()> {
     let mut lines = result.export.for_terminal();
     lines.push(format!("{}: {}", result.export.to, result.file));
     let text = lines.join("\n") + "\n";
-    print(&args.json, &text, &result, Some(stage(path, content)?))
+    print(json, &text, &result, Some(stage(path, content)?))
 }

@@ -10,7 +10,7 @@ use mimu_fleet::{fleet, fleet_and_prior};
 use mimu_recording::error::Result;
 
 use crate::arguments::{JsonArgs, VerboseArgs};
-use crate::output::{Results, check_outputs, progress};
+use crate::output::{Results, check_outputs, check_overwritten, progress};
 use crate::report::{Made, fleet_page, fleet_text};
 
 #[derive(Args)]
@@ -52,6 +52,7 @@ pub fn run(args: &FleetArgs, command_line: &str) -> Result<()> {
         &[args.out.as_deref(), args.prior.as_deref(), args.json.file()],
         &inputs,
     )?;
+    check_overwritten(&[args.out.as_deref(), args.prior.as_deref()])?;
     let table = args.labels.as_deref().map(LabelTable::read).transpose()?;
     let search = Search {
         folders: &args.names,

@@ -6,6 +6,7 @@ pub(crate) mod allan;
 pub(crate) mod apply;
 pub(crate) mod compare;
 pub(crate) mod completions;
+pub(crate) mod convert;
 pub(crate) mod design;
 #[cfg(not(target_family = "wasm"))]
 pub(crate) mod device;

@@ -16,7 +16,8 @@ use mimu_recording::{MANIFEST_FILE, Recording};
 use super::trajectory::TrajectoryArgs;
 use crate::arguments::{JsonArgs, StillArgs, StrictArgs};
 use crate::hint::OF_A_LOG;
-use crate::output::{Results, check_outputs, progress};
+use crate::opening;
+use crate::output::{Results, check_outputs, check_overwritten, progress};
 use crate::reading::{LogArgs, open};
 use crate::report;
 use crate::status::Status;
@@ -48,7 +49,7 @@ pub struct NoiseInUseArgs {
 }
 
 pub(crate) fn run(args: &NoiseInUseArgs) -> Result<Status> {
-    let calibration = args.calibration.as_deref().map(Calibration::read);
+    let calibration = args.calibration.as_deref().map(opening::calibration);
     let calibration = calibration.transpose()?;
     let noise = NoiseFile::read(&args.noise)?;
     let known = calibration.as_ref().and_then(|c| c.recording.gravity_mps2);
@@ -62,6 +63,7 @@ pub(crate) fn run(args: &NoiseInUseArgs) -> Result<Status> {
     inputs.extend(args.calibration.as_deref());
     inputs.extend(args.trajectory.trajectory.as_deref());
     check_outputs(&[args.output.as_deref(), args.json.file()], &inputs)?;
+    check_overwritten(&[args.output.as_deref()])?;
     let bar = progress("dead reckoning");
     let result = args.found(&recording, &calibration, &noise, &|share| bar.reach(share));
     bar.finish();

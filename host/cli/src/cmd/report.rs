@@ -15,7 +15,8 @@ use mimu_recording::result_file::stage;
 
 use crate::arguments::{KeepArgs, NoiseArgs, PartArgs, StillArgs, WholeTurnArgs, with_noise};
 use crate::hint::OF_A_LOG;
-use crate::output::{now, progress, show};
+use crate::opening;
+use crate::output::{check_overwritten, now, progress, show};
 use crate::reading::{LogArgs, read};
 use crate::report::refused;
 use crate::report::{Made, Particulars, UnitReport, problems_text, unit_page};
@@ -95,6 +96,7 @@ pub fn run(args: &ReportArgs, command_line: &str) -> Result<()> {
     let particulars = particulars.transpose()?;
     let inputs = Inputs::of(args)?;
     let outputs = [Some(args.out.as_path())];
+    check_overwritten(&outputs)?;
     let others = [&args.noise.file, &inputs.calibration, &args.certificate];
     let others = others.map(Option::as_deref);
     let noise = args.noise.read()?;
@@ -120,7 +122,7 @@ pub fn run(args: &ReportArgs, command_line: &str) -> Result<()> {
         }
     };
     let calibration = match (&inputs.calibration, &found) {
-        (Some(path), _) => Calibration::read(path)?,
+        (Some(path), _) => opening::calibration(path)?,
         (None, Some(found)) => found.calibration(&now)?,
         // The arguments require one of the two.
         (None, None) => return Ok(()),

@@ -11,6 +11,7 @@ use mimu::judgement::Judgement;
 use mimu::noise::noise_file::NoiseFile;
 use mimu::prepared::Prepared;
 use mimu::signal::stillness::DwellSearch;
+use mimu_export::fitting_convention::{self, Reading};
 use mimu_recording::error::Result;
 use serde::Serialize;
 use serde_json::json;
@@ -20,6 +21,7 @@ use crate::arguments::{
     JsonArgs, NoiseArgs, PartArgs, StillArgs, StrictArgs, VerboseArgs, WholeTurnArgs, with_noise,
 };
 use crate::hint::OF_A_LOG;
+use crate::opening::{self, Opened};
 use crate::output::print;
 use crate::reading::{LogArgs, open, read_with_samples};
 use crate::report;
@@ -31,7 +33,7 @@ use crate::status::Status;
 pub struct VerifyArgs {
     /// Recording, of samples or of means, or a log that `mimu import` reads
     recording: PathBuf,
-    /// Calibration file
+    /// Calibration file, mimu's or another program's, whose conventions are tried on the recording
     #[arg(long, value_name = "FILE")]
     calibration: PathBuf,
     #[command(flatten)]
@@ -55,27 +57,45 @@ pub struct VerifyArgs {
 }
 
 pub(crate) fn run(args: &VerifyArgs) -> Result<Status> {
-    let calibration = Calibration::read(&args.calibration)?;
+    let opened = opening::open(&args.calibration)?;
     let outputs = [args.json.file()];
-    let log = args.log.or_gravity(calibration.recording.gravity_mps2);
+    let log = args.log.or_gravity(opened.gravity_mps2());
     let inputs = [Some(args.calibration.as_path()), args.noise.file.as_deref()];
     if let Some(by) = args.trajectory.read()? {
         let recording = open(&args.recording, &log)?;
+        let calibration = opening::calibration(&args.calibration)?;
         let (text, all, judgement) = trajectory::verified(&recording, &by, &calibration)?;
         print(&args.json, &text, &all, None)?;
         return Ok(args.strict.status(&judgement));
     }
     let samples = RefCell::new(None);
-    let opened = |search| {
+    let read_at = |search| {
         let read = read_with_samples(&args.recording, &log, search, &outputs, &inputs)?;
         samples.replace(read.1);
         Ok(read.0)
     };
     let noise = args.noise.read()?;
-    let made = args.judged(&opened, noise.as_ref(), &calibration)?;
+    let made = args.judged_as(&read_at, noise.as_ref(), &|prepared| match &opened {
+        Opened::Own(own) => Ok((own.as_ref().clone(), None)),
+        Opened::Foreign(other) => {
+            let (calibration, readings) = fitting_convention::calibration(other, prepared)?;
+            let lines = [
+                other.place.as_str(),
+                ": a file of ",
+                other.format.name,
+                "\n",
+            ]
+            .concat();
+            let mut text = readings
+                .iter()
+                .fold(lines, |all, reading| all + &reading.text(other.format.name));
+            text.extend(other.left_out().map(|line| line + "\n"));
+            Ok((calibration, Some((text, readings))))
+        }
+    })?;
     let further = samples
         .take()
-        .map(|of| mimu_body::verify(&of, &calibration));
+        .map(|of| mimu_body::verify(&of, &made.calibration));
     let further = further.transpose()?.unwrap_or_default();
     let text = made.text(args.verbose.verbose);
     if further.is_empty() {
@@ -101,11 +121,24 @@ impl VerifyArgs {
         noise: Option<&NoiseFile>,
         calibration: &Calibration,
     ) -> Result<Verified> {
+        self.judged_as(open, noise, &|_| Ok((calibration.clone(), None)))
+    }
+
+    fn judged_as(
+        &self,
+        open: &dyn Fn(DwellSearch) -> Result<Prepared>,
+        noise: Option<&NoiseFile>,
+        calibration: &dyn Fn(&Prepared) -> Result<(Calibration, Option<Read>)>,
+    ) -> Result<Verified> {
         let part = self.part.part()?;
         let prepared = with_noise(open(self.still.search())?, noise)?;
+        let prepared = self.whole.apply(prepared)?;
+        let (calibration, read) = calibration(&prepared)?;
         Ok(Verified {
-            result: verify(&self.whole.apply(prepared)?, calibration)?,
-            sheet: part.map(|part| DataSheet::of(calibration, noise, &part)),
+            result: verify(&prepared, &calibration)?,
+            sheet: part.map(|part| DataSheet::of(&calibration, noise, &part)),
+            read,
+            calibration,
         })
     }
 }
@@ -115,20 +148,42 @@ pub struct Verified {
     /// The verification.
     pub result: Verification,
     sheet: Option<DataSheet>,
+    read: Option<Read>,
+    calibration: Calibration,
+}
+
+/// How the file of another program was read: as text, and each triad.
+type Read = (String, Vec<Reading>);
+
+/// A result with how a file of another program was read, as JSON has them.
+#[derive(Serialize)]
+struct WithReadings<'a, T: Serialize> {
+    #[serde(flatten)]
+    result: T,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    conventions: Option<&'a [Reading]>,
 }
 
 impl Verified {
     /// Its result as JSON.
     pub fn json(&self) -> impl Serialize {
-        WithDataSheet {
-            result: &self.result,
-            data_sheet: self.sheet.as_ref(),
+        WithReadings {
+            result: WithDataSheet {
+                result: &self.result,
+                data_sheet: self.sheet.as_ref(),
+            },
+            conventions: self.read.as_ref().map(|(_, all)| all.as_slice()),
         }
     }
 
     /// What the command prints.
     pub fn text(&self, verbose: bool) -> String {
-        let mut text = report::verify_text(&self.result, verbose);
+        let mut text = self
+            .read
+            .as_ref()
+            .map(|read| read.0.clone())
+            .unwrap_or_default();
+        text += &report::verify_text(&self.result, verbose);
         text.extend(self.sheet.as_ref().map(data_sheet_text));
         text
     }

@@ -47,15 +47,39 @@ fn a_log_becomes_a_header_in_two_commands_and_nothing_is_replaced_by_mistake() {
     let out = mimu(at, "export c cal.toml --calibration cal.toml -o third.h");
     assert_eq!(out.status, Some(2));
 
-    // The recording was kept.
-    let before = std::fs::read(at.join("cal.toml")).unwrap();
-    let error = refused(at, "fit rec -o cal.toml");
-    let said = "mimu: cal.toml: the file exists; choose another name, or replace it (--replace)";
-    assert_eq!(error, said);
-    assert_eq!(refused(at, "diagnose rec -o cal.toml"), said);
-    assert_eq!(std::fs::read(at.join("cal.toml")).unwrap(), before);
-    done(at, "fit rec -o cal.toml --replace");
+    // The recording was kept, and a file of mimu is written again.
+    for command in [
+        "fit rec -o cal.toml",
+        "export c cal.toml -o cal.h",
+        "design -n 12 --reference gravity -o plan.toml",
+        "design -n 12 --reference gravity -o plan.toml",
+    ] {
+        done(at, command);
+    }
     done(at, "verify log.csv --calibration cal.toml");
+    // A file of anything else is not.
+    let own = "thesis, chapter 3: mimu, a comparison\n";
+    std::fs::write(at.join("notes"), own).unwrap();
+    let said = "mimu: notes: the file exists, and mimu did not write it; choose another name, or remove it";
+    for command in ["fit rec", "diagnose rec"] {
+        let error = refused(at, &format!("{command} -o notes"));
+        assert_eq!(error, format!("{said} (--replace)"));
+    }
+    for command in [
+        "export c cal.toml",
+        "convert cal.toml --to json",
+        "allan rec",
+        "design -n 12 --reference gravity",
+        "report rec",
+    ] {
+        assert_eq!(
+            refused(at, &format!("{command} -o notes")),
+            said,
+            "{command}"
+        );
+    }
+    assert_eq!(std::fs::read_to_string(at.join("notes")).unwrap(), own);
+    done(at, "fit rec -o notes --replace");
 }
 
 #[test]

@@ -15,6 +15,7 @@ mod doubtful_input;
 mod effects;
 mod export_over_temperature;
 mod first_minutes;
+mod foreign_calibration;
 mod fuzz;
 mod import_command;
 mod manual;

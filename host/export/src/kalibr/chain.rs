@@ -142,7 +142,7 @@ fn noise(
     let gains = PerSensor::from([gain(gyro)?, gain(accel)?]);
     let name = format!("imu{}", number - 1);
     match options.noise.walks.of_unit(file, number, &gains)? {
-        Some(densities) => *out += &lines("  ", &KEYS, &densities, |density| density),
+        Some(densities) => *out += &lines("  ", &KEYS, &densities, f64::NAN),
         None => export.note(format!(
             "{name}: the noise file has no channels of {} and {}, so its densities are missing: add them for programs that need them.",
             gyro.triad, accel.triad

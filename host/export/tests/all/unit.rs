@@ -23,6 +23,7 @@ fn nominal(raw_unit: &str, sensor: &str) -> (f64, f64) {
     match (raw_unit, sensor) {
         ("count", "gyro") => (7509.9, 40.0),
         ("count", _) => (835.35, -60.0),
+        ("SI", _) => (1.0, 0.02),
         (_, "gyro") => (0.344, 2.5),
         _ => (0.0306, 1.65),
     }
@@ -52,7 +53,7 @@ pub fn calibration(over_temperature: bool) -> Calibration {
     calibration_of("V", over_temperature)
 }
 
-/// Of readings in `V` or `count`.
+/// Of readings in `V`, `count` or `SI`.
 pub fn calibration_of(raw_unit: &str, over_temperature: bool) -> Calibration {
     let version = if over_temperature { 2 } else { 1 };
     let mut text = format!(

@@ -59,8 +59,13 @@ impl Calibration {
                 format!("it stores the effect \"{effect}\", which this program does not know");
             Error::new(place, problem, "update mimu on this computer")
         };
-        let triad =
-            |model, sensor| triad_table(model, sensor, stored.raw_unit).ok_or_else(singular);
+        let triad = |model: &Affine<f32>, sensor| {
+            let exact = Affine {
+                matrix: model.matrix.map(f64::from),
+                offset: model.offset.map(f64::from),
+            };
+            triad_table(&exact, sensor, stored.raw_unit, "body").ok_or_else(singular)
+        };
         let temperature = over_temperature(stored);
         let range_c = stored.range_c.map(|range| range.map(f64::from));
         let recording = Origin {
@@ -84,6 +89,29 @@ impl Calibration {
         calibration.checked(place)
     }
 
+    /// The calibration in another program's file, whose numbers are `models`, raw to SI in the axes that `frame` names. It has no uncertainty, no date and no
+    /// judgement, as the file has none.
+    ///
+    /// # Errors
+    /// No program could apply it; `place` names the file.
+    pub fn of_program(
+        models: &PerSensor<Option<Affine<f64>>>,
+        (device, raw_unit, frame): (&str, RawUnit, &str),
+        place: &str,
+    ) -> Result<Self> {
+        let singular = || Error::new(place, "C is singular", "check the numbers of the file");
+        let triad = |sensor: Sensor| {
+            let table = |model| triad_table(model, sensor, raw_unit, frame).ok_or_else(singular);
+            models[sensor].as_ref().map(table).transpose()
+        };
+        let calibration = Self {
+            gyro: triad(Sensor::Gyro)?,
+            accel: triad(Sensor::Accel)?,
+            ..Self::empty(device, Origin::of(raw_unit))
+        };
+        calibration.checked(place)
+    }
+
     /// The calibration that leaves readings in SI as they are.
     ///
     /// # Errors
@@ -98,15 +126,12 @@ impl Calibration {
             let remedy = "give the unit's calibration; readings in rad/s and m/s² need none";
             return Err(Error::new(place, problem, remedy));
         }
-        let table = |sensor| {
-            let triad = Triad::from_inverse(Affine::identity(), Vec::new())?;
-            Some(exact_table(&triad, sensor, RawUnit::Si, "body"))
-        };
-        Ok(Self {
-            unit_id: manifest.unit_id().map(str::to_owned),
-            gyro: table(Sensor::Gyro),
-            accel: table(Sensor::Accel),
-            ..Self::empty(&manifest.device, Origin::of(RawUnit::Si))
+        let as_it_is = PerSensor::both(Some(Affine::identity()));
+        Self::of_program(&as_it_is, (&manifest.device, RawUnit::Si, "body"), &place).map(|own| {
+            Self {
+                unit_id: manifest.unit_id().map(str::to_owned),
+                ..own
+            }
         })
     }
 }
@@ -147,14 +172,13 @@ fn over_temperature(stored: &DeviceCalibration) -> Option<OverTemperature> {
 }
 
 /// `None` if the matrix is singular.
-fn triad_table(model: &Affine<f32>, sensor: Sensor, raw_unit: RawUnit) -> Option<TriadTable> {
-    let inverse = Affine {
-        matrix: model.matrix.map(f64::from),
-        offset: model.offset.map(f64::from),
-    };
+fn triad_table(
+    inverse: &Affine<f64>,
+    sensor: Sensor,
+    raw_unit: RawUnit,
+    frame: &str,
+) -> Option<TriadTable> {
     // Without a covariance its sigmas mean nothing, so they are left out.
-    let triad = Triad::from_inverse(inverse, Vec::new())?;
-    Some(exact_table(&triad, sensor, raw_unit, "body"))
+    let triad = Triad::from_inverse(*inverse, Vec::new())?;
+    Some(exact_table(&triad, sensor, raw_unit, frame))
 }
-
-// These keep the sign of a zero, so the device makes the same bytes of them.

@@ -80,6 +80,15 @@ pub struct SensorVerification {
     pub bias_moved: Vec<BiasMoved>,
 }
 
+impl SensorVerification {
+    /// Whether a figure of it significantly exceeds that of `other`, which the same data judge.
+    pub fn exceeds(&self, other: &Self) -> bool {
+        let at_rest = self.static_rms.zip(other.static_rms);
+        exceeds(self.rms, other.rms, self.figure, self.count)
+            || at_rest.is_some_and(|(own, other)| exceeds(own, other, Figure::Input, self.count))
+    }
+}
+
 /// Result of verifying a calibration by a recording: `mimu-verify/1`.
 #[derive(Debug, Clone, Serialize)]
 pub struct Verification {

@@ -16,7 +16,7 @@ use mimu_recording::{RAW_COLUMNS, check_kind, parse_toml, read_text};
 pub const NOISE_FORMAT: &str = "mimu-noise/1";
 
 /// A noise file as `mimu allan -o` writes it.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NoiseFile {
     /// [`NOISE_FORMAT`].
@@ -41,7 +41,7 @@ pub struct NoiseFile {
 }
 
 /// One channel of a noise file.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NoiseChannel {
     /// Column: `gyro_x` to `accel_z`.

@@ -14,7 +14,7 @@ use mimu_recording::result_file::stage;
 
 use super::{PortArgs, open};
 use crate::arguments::JsonArgs;
-use crate::output::{check_outputs, print, progress};
+use crate::output::{check_outputs, check_overwritten, print, progress};
 
 #[derive(Args)]
 pub struct UploadArgs {
@@ -83,6 +83,7 @@ pub fn run_download(args: &DownloadArgs) -> Result<()> {
         args.json.file(),
     ];
     check_outputs(&outputs, &[])?;
+    check_overwritten(&outputs[..2])?;
     let mut session = open(&args.port)?;
     let bytes = download(&mut session)?;
     let port = session.port();

@@ -12,7 +12,7 @@ use mimu_thermal::basis::Shape;
 use mimu_thermal::plan::{Procedure, Request, plan, to_toml};
 
 use crate::arguments::{JsonArgs, number, range_c};
-use crate::output::{Results, check_outputs};
+use crate::output::{Results, check_outputs, check_overwritten};
 use crate::report;
 
 #[derive(Args)]
@@ -143,6 +143,7 @@ impl PlanArgs {
 pub(super) fn run(args: &PlanArgs) -> Result<()> {
     let stated: Vec<_> = args.noise.as_deref().into_iter().collect();
     check_outputs(&[args.output.as_deref(), args.json.file()], &stated)?;
+    check_overwritten(&[args.output.as_deref()])?;
     let planned = plan(&args.request()?)?;
     let mut out = Results::new(report::thermal_plan_text(&planned));
     let made = || Ok(to_toml(&planned, args.sample_rate));

@@ -1,0 +1,250 @@
+//! What a format writes, its reader reads: the same C and o within the printed digits, as far as the format has a place for them.
+
+use mimu::calibration::Calibration;
+use mimu::quantity::{PerSensor, Sensor};
+use mimu::triad::Forward;
+use mimu_allan::model::Term;
+use mimu_core::compensation::Affine;
+use mimu_export::foreign::{self, Foreign};
+use mimu_export::{FORMATS, Noise, Sources};
+use mimu_recording::RawUnit;
+use nalgebra::{Matrix3, Vector3};
+
+use crate::noise_of_one_axis::noise;
+use crate::unit::calibration_of;
+
+/// What a format keeps of a triad.
+#[derive(Clone, Copy, PartialEq)]
+enum Kept {
+    Nothing,
+    /// C and o.
+    Whole,
+    /// C and o in the frame of the accelerometer.
+    Rotated,
+    /// C in that frame, or in that of the calibration.
+    RotatedMatrix,
+    Matrix,
+    /// The diagonal of P and b.
+    Axes,
+    /// The diagonal of P.
+    Gains,
+    /// b.
+    Bias,
+}
+
+use Kept::{Axes, Bias, Gains, Matrix, Nothing, Rotated, RotatedMatrix, Whole};
+
+/// Format, its options, unit of the readings, what it keeps of gyro and accelerometer, and the largest error in SI: of rounding, or of single precision.
+#[rustfmt::skip]
+const CASES: [(&str, &[&str], &str, [Kept; 2], f64); 24] = [
+    ("c", &[], "count", [Whole, Whole], 1e-6),
+    ("rust", &[], "count", [Whole, Whole], 1e-6),
+    ("core", &[], "count", [Whole, Whole], 1e-6),
+    ("json", &[], "SI", [Whole, Whole], 1e-14),
+    ("kalibr", &[], "SI", [RotatedMatrix, RotatedMatrix], 1e-8),
+    ("kalibr", &["--result"], "SI", [RotatedMatrix, RotatedMatrix], 1e-8),
+    ("openvins", &[], "SI", [Matrix, Matrix], 1e-8),
+    ("openvins", &["--model", "rpng"], "SI", [Matrix, Matrix], 1e-8),
+    ("imu-calib", &[], "SI", [Nothing, Whole], 1e-8),
+    ("dlio", &[], "SI", [Bias, Whole], 1e-8),
+    ("imu-tk", &["--sensor", "accel"], "count", [Nothing, Whole], 1e-9),
+    ("imu-tk", &["--sensor", "gyro"], "count", [Whole, Nothing], 1e-9),
+    ("fusion", &[], "count", [Whole, Whole], 1e-5),
+    ("realsense", &[], "SI", [Whole, Whole], 1e-5),
+    ("realsense", &["--layout", "json"], "SI", [Whole, Whole], 1e-12),
+    ("depthai", &[], "SI", [Whole, Whole], 1e-12),
+    ("basalt", &[], "SI", [Rotated, Rotated], 1e-12),
+    ("matlab", &[], "SI", [Whole, Whole], 1e-12),
+    ("px4", &[], "SI", [Bias, Axes], 1e-5),
+    ("ardupilot", &["--qgc"], "SI", [Bias, Axes], 1e-5),
+    // Whole codes of 1/2048 g, and gains of 1/4096.
+    ("betaflight", &[], "SI", [Nothing, Bias], 0.0025),
+    ("inav", &["--acc-1g", "2048"], "SI", [Nothing, Axes], 0.004),
+    ("adafruit", &[], "SI", [Bias, Bias], 1e-6),
+    ("adafruit", &["--layout", "json"], "SI", [Bias, Bias], 1e-12),
+];
+/// Likewise.
+#[rustfmt::skip]
+const MORE: [(&str, &[&str], &str, [Kept; 2], f64); 5] = [
+    ("slimenrf", &[], "SI", [Gains, Nothing], 1e-5),
+    ("pigeon", &[], "SI", [Gains, Nothing], 1e-5),
+    ("iio", &[], "SI", [Bias, Bias], 1e-8),
+    ("autoware", &[], "SI", [Bias, Nothing], 1e-8),
+    ("gazebo", &[], "SI", [Bias, Bias], 1e-8),
+];
+
+/// The file of a format, read.
+fn read_back(name: &str, options: &[&str], calibration: &Calibration) -> Foreign {
+    let format = FORMATS.iter().find(|format| format.name == name).unwrap();
+    let options: Vec<String> = options.iter().map(ToString::to_string).collect();
+    let noise = noise();
+    let of_noise = format.noise == Noise::Only;
+    let from = Sources {
+        calibration: (!of_noise).then_some((calibration, "cal.toml")),
+        noise: (format.noise != Noise::No).then_some(&noise),
+        biases: None,
+    };
+    let export = format.chosen(&options).unwrap().export(&from).unwrap();
+    let place = if options.contains(&"gyro".into()) {
+        "gyro.calib"
+    } else {
+        "file"
+    };
+    let read = foreign::read(&export.content, place).unwrap();
+    read.unwrap_or_else(|| panic!("{name} {options:?} is not recognised"))
+}
+
+/// The part of `model` that is kept; `rotation` is that to the frame of the accelerometer.
+fn kept(model: &Affine<f64>, of: Kept, rotation: &Matrix3<f64>) -> Affine<f64> {
+    let Forward { matrix: p, bias: b } = Forward::of(model).unwrap();
+    let zero = Vector3::zeros();
+    let along = Matrix3::from_diagonal(&p.diagonal().map(f64::recip));
+    let [matrix, offset] = [model.matrix, Matrix3::from_diagonal(&model.offset)];
+    let (matrix, offset) = match of {
+        Whole | Nothing => (matrix, offset.diagonal()),
+        Matrix => (matrix, zero),
+        Rotated => (rotation * matrix, rotation * model.offset),
+        RotatedMatrix => (rotation * matrix, zero),
+        Axes => (along, -along * b),
+        Gains => (along, zero),
+        Bias => (Matrix3::identity(), -b),
+    };
+    Affine { matrix, offset }
+}
+
+#[test]
+fn what_a_format_keeps_of_a_calibration_is_read_back() {
+    for (name, options, unit, keeps, most) in CASES.into_iter().chain(MORE) {
+        let written = calibration_of(unit, false);
+        let models = PerSensor::from_fn(|s| written.inverse(s).unwrap());
+        let file = read_back(name, options, &written);
+        assert_eq!(file.format.name, name, "{options:?}");
+        let raw_unit = written.recording.raw_unit;
+        assert_eq!(file.raw_unit(RawUnit::Si), raw_unit, "{name}");
+        let read = file.calibration(RawUnit::Si).unwrap();
+        assert!(!read.is_uncertain(), "{name}");
+        let accel = read.inverse(Sensor::Accel);
+        let rotation = accel.map(|accel| accel.matrix * models.accel.matrix.try_inverse().unwrap());
+        let rotation = rotation.unwrap_or_else(Matrix3::identity);
+        for (sensor, of) in Sensor::BOTH.into_iter().zip(keeps) {
+            let Some(found) = read.inverse(sensor) else {
+                assert!(of == Nothing, "{name}: no {sensor}");
+                continue;
+            };
+            assert!(of != Nothing, "{name}: {sensor}");
+            if matches!(of, Rotated | RotatedMatrix) {
+                let error = rotation * rotation.transpose() - Matrix3::identity();
+                assert!(
+                    error.amax() < 1e-8 && rotation.determinant() > 0.0,
+                    "{name}"
+                );
+            }
+            // Compared at inputs of up to 1 g and 100 deg/s.
+            let expected = kept(&models[sensor], of, &rotation);
+            for k in 0..6 {
+                let size = if k % 2 == 0 { 1.75 } else { -1.75 };
+                let size = if sensor == Sensor::Gyro {
+                    size
+                } else {
+                    5.6 * size
+                };
+                let raw = Forward::of(&models[sensor])
+                    .unwrap()
+                    .apply(&Vector3::ith(k / 2, size));
+                let error = (found.apply(&raw) - expected.apply(&raw)).amax();
+                assert!(error <= most, "{name} {options:?}, {sensor}: {error}");
+            }
+        }
+    }
+}
+
+#[test]
+fn every_format_is_read_back() {
+    let tried: Vec<&str> = CASES.iter().chain(&MORE).map(|case| case.0).collect();
+    let calibration = calibration_of("SI", false);
+    for format in FORMATS {
+        if format.noise == Noise::Only {
+            assert_eq!(
+                read_back(format.name, &[], &calibration).format.name,
+                format.name
+            );
+        } else {
+            assert!(tried.contains(&format.name), "{}", format.name);
+        }
+    }
+}
+
+#[test]
+fn noise_is_read_back_in_the_densities_that_were_written() {
+    let (calibration, written) = (calibration_of("SI", false), noise());
+    for format in FORMATS.iter().filter(|f| f.noise != Noise::No) {
+        let file = read_back(format.name, &[], &calibration);
+        let found = file.noise(Some(written.sample_rate_hz)).unwrap().unwrap();
+        // The files of a program with one number have the worst axis, of the readings before the calibration if the file has one.
+        for channel in &found.channel {
+            for term in [Term::N, Term::K] {
+                let Ok(density) = channel.get(term).map(|c| c.value) else {
+                    // No place for a walk.
+                    assert!(
+                        ["ros-imu", "autoware"].contains(&format.name),
+                        "{}",
+                        format.name
+                    );
+                    continue;
+                };
+                let of = written
+                    .channel
+                    .iter()
+                    .filter(|c| c.name[..4] == channel.name[..4]);
+                let values: Vec<f64> = of.map(|c| c.get(term).unwrap().value).collect();
+                let axis = written
+                    .channel
+                    .iter()
+                    .find(|c| c.name == channel.name)
+                    .unwrap();
+                let own = axis.get(term).unwrap().value;
+                let worst = values.into_iter().fold(0.0, f64::max);
+                let is_one_of = [own, worst]
+                    .iter()
+                    .any(|v| (density / v - 1.0).abs() < 0.02);
+                assert!(is_one_of, "{}, {}: {density}", format.name, channel.name);
+                assert!(channel.get(term).unwrap().sigma.is_nan());
+            }
+        }
+        assert_eq!(found.channel.len(), 6, "{}", format.name);
+    }
+}
+
+#[test]
+fn what_is_missing_is_named_with_its_key() {
+    let refused = |text: &str| {
+        let error = foreign::read(text.as_bytes(), "cal.yaml").err();
+        error.map(|e| e.to_string()).unwrap_or_default()
+    };
+    let said = refused("SM: [1, 0, 0, 0, 1, 0, 0, 0]\nbias: [0, 0, 0]\n");
+    assert!(
+        said.starts_with("cal.yaml, key SM: it is missing, or has fewer numbers than 9"),
+        "{said}"
+    );
+    let said = refused("CAL_ACC0_XOFF 0.1\nCAL_ACC0_YOFF 0.1\nCAL_ACC0_ZOFF 0.1\n");
+    assert!(
+        said.starts_with("cal.yaml, key CAL_ACC0_{AXIS}SCALE: it is missing"),
+        "{said}"
+    );
+    assert!(
+        foreign::read(b"t,x,y\n1,2,3\n", "log.csv")
+            .unwrap()
+            .is_none()
+    );
+    let noise = foreign::read(b"acc_n: 0.1\ngyr_n: 0.01\n", "vins.yaml")
+        .unwrap()
+        .unwrap();
+    assert!(noise.calibration(RawUnit::Si).is_err());
+    assert!(
+        noise
+            .noise(None)
+            .unwrap_err()
+            .to_string()
+            .contains("does not say the rate")
+    );
+}
