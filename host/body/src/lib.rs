@@ -11,6 +11,7 @@ mod field;
 mod fitted;
 mod judge;
 mod pieces;
+mod relation;
 pub mod result;
 mod same_body;
 mod series;
@@ -24,7 +25,7 @@ use mimu::prepared::Prepared;
 use mimu::quantity::{PerSensor, Sensor};
 use mimu::signal::dwell::Dwell;
 use mimu::signal::stillness::DwellSearch;
-use mimu::triad::{Estimate, half_width_95};
+use mimu::triad::Estimate;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{RawUnit, Recording, TriadKind, TriadName};
 use nalgebra::Rotation3;
@@ -35,7 +36,7 @@ pub use verify::{TriadVerification, verify};
 
 use carrier::{Carrier, Unit, read};
 use field::Field;
-use same_body::Relation;
+use relation::{DELAY, Relation};
 use series::Series;
 
 /// What is given of a body.
@@ -229,57 +230,36 @@ impl Fitting<'_> {
                 "the first {sensor}, which it is compared with, is not calibrated"
             )));
         };
-        let relation = Relation::of(kind, raw, &reference).ok_or_else(|| {
+        let relation = same_body::relation(kind, raw, &reference).ok_or_else(|| {
             judge::undetermined(match sensor {
                 Sensor::Gyro => "its scale factors and angles are not determined: turn the body about all three axes",
                 Sensor::Accel => "its scale factors and angles are not determined: bring each axis up, down and in between",
             })
         })?;
-        let reference_parts = fitted::by_reference(&relation.calibration, unit);
-        let parts = [vec![relation.part()], reference_parts].concat();
-        let placed = fitted::placed(&relation.calibration, &parts)
-            .ok_or_else(|| judge::undetermined("two of its axes read the same"))?;
-        let [delay, arm] = relation.undetermined;
-        let at = |k: usize, scale: f64| estimate(&relation.covariance, relation.dof, k, scale);
-        let excess = relation.errors.held_out_rms / relation.errors.noise_floor;
-        let delay_ms = match sensor {
-            _ if delay >= DETERMINED => Err(
-                "its readings change too slowly to show a delay: turn and shake the body"
-                    .to_string(),
-            ),
-            // Measured on eight chips with one clock: 2 to 5 times the interval off, where those of their gyros were right.
-            Sensor::Accel if excess > FAITHFUL => Err(format!(
-                "it errs by {excess:.0} times its noise in motion, as where samples are too slow for it, and a delay would follow these errors"
-            )),
-            _ => Ok(at(12, 1e3)(relation.delay_s)),
-        };
-        let lever_arm_mm = match (kind, reference.motion) {
-            (TriadKind::Gyro, _) => Err("a gyro reads the same everywhere on a body".to_string()),
-            (_, None) => Err("without a gyro no rate is known".to_string()),
-            _ if arm < DETERMINED => Ok([0, 1, 2].map(|i| at(13 + i, 1e3)(relation.arm_m[i]))),
-            _ => Err(
-                "the body turns too slowly to show a lever arm: turn it faster, about two axes"
-                    .to_string(),
-            ),
-        };
-        Ok(FittedTriad {
+        let by_reference = fitted::by_reference(&relation.calibration(), unit);
+        let judgement = judge::same_body(&relation.errors, reference.signal(), sensor);
+        let mut triad = FittedTriad::of(
             name,
-            reference: TriadName::first(kind),
-            unit: sensor.unit(),
-            judgement: judge::same_body(&relation.errors, reference.signal(), sensor),
-            triad: placed.triad,
-            rotation: placed.rotation,
-            rotation_deg: placed.rotation_deg,
-            delay_ms,
-            lever_arm_mm,
-            dip_deg: None,
-            rms: relation.errors.rms,
-            held_out_rms: relation.errors.held_out_rms,
-            noise_floor: relation.errors.noise_floor,
-            window_s: same_body::WINDOW_S,
-            windows: relation.errors.windows,
-            left_out: relation.left_out,
-        })
+            (&relation, by_reference),
+            (sensor.unit(), same_body::WINDOW_S),
+            judgement,
+        )
+        .ok_or_else(axes_alike)?;
+        let excess = relation.errors.held_out_rms / relation.errors.noise_floor;
+        if relation.undetermined(DELAY) >= DETERMINED {
+            triad.delay_ms = Err(
+                "its readings change too slowly to show a delay: turn and shake the body".into(),
+            );
+        } else if sensor == Sensor::Accel && excess > FAITHFUL {
+            // Measured on eight chips with one clock: 2 to 5 times the interval off, where those of their gyros were right.
+            triad.delay_ms = Err(format!(
+                "it errs by {excess:.0} times its noise in motion, as where samples are too slow for it, and a delay would follow these errors"
+            ));
+        }
+        if kind == TriadKind::Accel {
+            triad.lever_arm_mm = arm(&relation);
+        }
+        Ok(triad)
     }
 
     fn magnetometer(
@@ -296,66 +276,50 @@ impl Fitting<'_> {
         };
         let size = options.field_ut.unwrap_or(1.0);
         let raw = raw.without_repeats();
-        let field = Field::of(raw, motion, &self.unit.rests, size, self.unit.rate_bias).ok_or_else(|| {
+        let field = Field::of(&raw, motion, &self.unit.rests, size, self.unit.rate_bias).ok_or_else(|| {
             judge::undetermined("the field turns too little in its readings: bring each axis to point each way, and turn about all three")
         })?;
         judge::determines(&field)?;
-        let turned = fitted::turned_with(&field.calibration, gyro);
-        let parts = [vec![field.part()], turned].concat();
-        let placed = fitted::placed(&field.calibration, &parts)
-            .ok_or_else(|| judge::undetermined("two of its axes read the same"))?;
-        let at = |k: usize, scale: f64| estimate(&field.covariance, field.dof, k, scale);
-        let sine = field.dip_sine.clamp(-0.999_999, 0.999_999);
-        let by_sine = (1.0 - sine * sine).sqrt().recip().to_degrees();
-        let dip = match field.rests {
-            0 => Err("no rest shows where up is".to_string()),
-            _ => Ok(Estimate {
-                value: sine.asin().to_degrees(),
-                ..at(13, by_sine)(sine)
-            }),
+        let relation = &field.relation;
+        let turned = fitted::turned_with(&relation.calibration(), gyro);
+        let unit = match options.field_ut {
+            Some(_) => "uT",
+            None => "field",
         };
-        Ok(FittedTriad {
+        let mut triad = FittedTriad::of(
             name,
-            reference: TriadName::first(TriadKind::Gyro),
-            unit: if options.field_ut.is_some() {
-                "uT"
-            } else {
-                "field"
-            },
-            judgement: judge::field(&field, size),
-            triad: placed.triad,
-            rotation: placed.rotation,
-            rotation_deg: placed.rotation_deg,
-            delay_ms: match field.delay_undetermined < DETERMINED {
-                true => Ok(at(12, 1e3)(field.delay_s)),
-                false => Err("the body turns too slowly to show a delay".to_string()),
-            },
-            lever_arm_mm: Err("a magnetometer reads the same everywhere on a body".to_string()),
-            dip_deg: Some(dip),
-            rms: field.errors.rms,
-            held_out_rms: field.errors.held_out_rms,
-            noise_floor: field.errors.noise_floor,
-            window_s: field::TURN_S,
-            windows: field.errors.windows,
-            left_out: field.left_out,
-        })
+            (relation, turned),
+            (unit, field::TURN_S),
+            judge::field(&field, size),
+        )
+        .ok_or_else(axes_alike)?;
+        if relation.undetermined(DELAY) >= DETERMINED {
+            triad.delay_ms = Err("the body turns too slowly to show a delay".into());
+        }
+        triad.dip_deg = Some(field.dip_deg());
+        triad.left_out = field.left_out.spans;
+        Ok(triad)
+    }
+}
+
+fn axes_alike() -> Judgement {
+    judge::undetermined("two of its axes read the same")
+}
+
+/// The lever arm of an accelerometer.
+fn arm(relation: &Relation) -> Known<[Estimate; 3]> {
+    let arm = [0, 1, 2].map(|i| same_body::ARM + i);
+    if relation.at.len() <= arm[2] {
+        return Err("without a gyro no rate is known".into());
+    }
+    let open = arm.map(|k| relation.undetermined(k));
+    match open.into_iter().fold(0.0, f64::max) < DETERMINED {
+        true => Ok(arm.map(|k| relation.estimate(k, 1e3))),
+        false => Err(
+            "the body turns too slowly to show a lever arm: turn it faster, about two axes".into(),
+        ),
     }
 }
 
 /// Fewest readings of a triad.
 const FEWEST: usize = 100;
-
-/// A parameter with its interval, in units of `scale`, given its value.
-fn estimate(
-    covariance: &nalgebra::DMatrix<f64>,
-    dof: f64,
-    k: usize,
-    scale: f64,
-) -> impl Fn(f64) -> Estimate {
-    let variance = covariance[(k, k)].max(0.0) * scale * scale;
-    move |value| Estimate {
-        value: value * scale,
-        sigma: variance.sqrt(),
-        interval: half_width_95([(variance, dof)].into_iter()),
-    }
-}
