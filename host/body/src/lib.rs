@@ -4,6 +4,7 @@
 //! kind in the motion that all feel (`same_body.rs`), magnetometers by what the Earth's field keeps while the body turns (`field.rs`). Each gets its calibration, its
 //! rotation, its delay, an accelerometer its lever arm, each with its interval; what a recording leaves open is not given, with the reason.
 
+pub mod aligned;
 mod carrier;
 mod clustered;
 mod errors;

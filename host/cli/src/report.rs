@@ -41,7 +41,7 @@ mod wizard;
 #[cfg(not(target_family = "wasm"))]
 pub use accept::{accept_line, accept_text};
 pub use allan::allan_text;
-pub use apply::apply_text;
+pub use apply::{apply_text, mean_text};
 pub(crate) use body::{body_errors_text, body_text, split_text, with_sensors};
 pub use certificate::certificate_page;
 pub use compare::compare_text;

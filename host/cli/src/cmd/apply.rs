@@ -4,7 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 use mimu::calibration::Calibration;
-use mimu::calibration::apply::{Applied, Compensated, apply};
+use mimu::calibration::apply::{Applied, Compensated};
+use mimu_body::aligned::{Aligned, MeanUnit, apply};
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{CopiedTable, MANIFEST_FILE, Recording, ReplacedTriad, SampleFormat};
 
@@ -27,7 +28,10 @@ pub(crate) struct ApplyArgs {
     /// Replace an existing recording
     #[arg(long)]
     replace: bool,
-    /// Directory of the compensated recording, in which further triads are rotated into the frame of their reference and keep their times; for a log of text also a CSV file: a copy of its rows with compensated readings
+    /// Write the mean unit of an array in the place of its first gyro and accelerometer: each in their frame and at their place
+    #[arg(long)]
+    mean: bool,
+    /// Directory of the compensated recording, in which further triads are rotated into the frame of their reference and moved by their delays; for a log of text also a CSV file: a copy of its rows with compensated readings
     #[arg(short, value_name = "DIR|FILE.csv")]
     output: PathBuf,
     #[command(flatten)]
@@ -42,15 +46,30 @@ pub(crate) fn run(args: &ApplyArgs) -> Result<()> {
         .output
         .extension()
         .is_some_and(|ending| ending.eq_ignore_ascii_case("csv"));
-    let applied = match args.recording.is_file() && is_table {
+    let (applied, mean) = match args.recording.is_file() && is_table {
         true => copied(args, &calibration)?,
         false => written(args, &calibration)?,
     };
-    print(&args.json, &report::apply_text(&applied), &applied, None)
+    let mut text = report::apply_text(&applied);
+    match mean {
+        None => print(&args.json, &text, &applied, None),
+        Some(mean) => {
+            text += &report::mean_text(&mean);
+            let mean = serde_json::json!({ "mean": mean });
+            print(
+                &args.json,
+                &text,
+                &report::with_sensors(&applied, &mean),
+                None,
+            )
+        }
+    }
 }
 
+type Made = (Applied, Option<MeanUnit>);
+
 /// Writes a recording.
-fn written(args: &ApplyArgs, calibration: &Calibration) -> Result<Applied> {
+fn written(args: &ApplyArgs, calibration: &Calibration) -> Result<Made> {
     let recording = open(&args.recording, &args.log)?;
     let manifest = args.recording.join(MANIFEST_FILE);
     let inputs = [
@@ -64,9 +83,8 @@ fn written(args: &ApplyArgs, calibration: &Calibration) -> Result<Applied> {
     let done = apply(
         &recording,
         calibration,
-        &args.output,
-        args.format,
-        args.replace,
+        (&args.output, args.format, args.replace),
+        args.mean,
         |share| bar.reach(share),
     );
     bar.finish();
@@ -74,7 +92,7 @@ fn written(args: &ApplyArgs, calibration: &Calibration) -> Result<Applied> {
 }
 
 /// Writes a copy of a text file, with its readings compensated: stamps and all other columns stay as they are.
-fn copied(args: &ApplyArgs, calibration: &Calibration) -> Result<Applied> {
+fn copied(args: &ApplyArgs, calibration: &Calibration) -> Result<Made> {
     if args.output.exists() && !args.replace {
         let error = Error::new(
             args.output.display(),
@@ -88,6 +106,7 @@ fn copied(args: &ApplyArgs, calibration: &Calibration) -> Result<Applied> {
     let (folder, options) = imported_to(&args.recording, &args.log)?;
     let recording = named(Recording::open(&folder)?, &args.recording);
     let bar = progress("compensating");
+    let mut aligned = Aligned::of(&recording, calibration, args.mean)?;
     let mut compensated =
         Compensated::new(&recording, calibration, |share| bar.reach(0.5 * share))?;
     let replaced = compensated.units().map(|(triad, unit)| ReplacedTriad {
@@ -99,6 +118,7 @@ fn copied(args: &ApplyArgs, calibration: &Calibration) -> Result<Applied> {
     compensated.for_each(
         |share| bar.reach(0.5 + 0.5 * share),
         |_, clean| {
+            aligned.place(clean);
             rows += clean.len() as u64;
             (0..clean.len()).try_for_each(|k| {
                 copy.row(|column| {
@@ -110,5 +130,5 @@ fn copied(args: &ApplyArgs, calibration: &Calibration) -> Result<Applied> {
     )?;
     bar.finish();
     copy.write(&args.output)?;
-    Ok(compensated.into_applied(&args.output, rows))
+    Ok(aligned.finish(compensated.into_applied(&args.output, rows)))
 }
