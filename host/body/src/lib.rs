@@ -4,6 +4,7 @@
 //! kind in the motion that all feel (`same_body.rs`), magnetometers by what the Earth's field keeps while the body turns (`field.rs`). Each gets its calibration, its
 //! rotation, its delay, an accelerometer its lever arm, each with its interval; what a recording leaves open is not given, with the reason.
 
+mod accel_delay;
 pub mod aligned;
 mod carrier;
 mod clustered;
@@ -20,10 +21,11 @@ pub mod split;
 mod standing;
 mod verify;
 
-use mimu::fit::Fit;
+use mimu::fit::{Fit, Options as FitOptions, fit};
 use mimu::judgement::Judgement;
 use mimu::prepared::Prepared;
 use mimu::quantity::{PerSensor, Sensor};
+use mimu::result::fit::FitResult;
 use mimu::signal::dwell::Dwell;
 use mimu::signal::stillness::DwellSearch;
 use mimu::triad::Estimate;
@@ -31,6 +33,7 @@ use mimu_recording::error::{Error, Result};
 use mimu_recording::{RawUnit, Recording, TriadKind, TriadName};
 use nalgebra::Rotation3;
 
+pub use accel_delay::accel_delay_ms;
 pub use fitted::{FittedTriad, Known};
 pub use split::Split;
 pub use verify::{TriadVerification, verify};
@@ -130,63 +133,77 @@ impl Body {
     }
 }
 
-/// The errors of turns of all pairs of a body, each fitted for itself like the first (`unit`), in the frame of the first: the part that all share, and the part of each.
-/// `None` if there is only one pair, or if turns that two pairs share are too few.
-///
-/// # Errors
-/// The samples cannot be read.
-pub fn split_turns(
-    recording: &Recording,
-    unit: &Fit,
-    search: DwellSearch,
-) -> Result<Option<Split>> {
-    let triads = recording.triads();
-    let has = |number| {
+/// The pairs of a body: a gyro and an accelerometer with one number each.
+#[derive(Debug, Clone)]
+pub struct Pairs {
+    /// What their turns err by, split into the part that all share and the part of each.
+    pub split: Split,
+    /// The recording of the first pair without the part that all share; `None` for two pairs, or if noise explains what they share.
+    pub first: Option<Prepared>,
+}
+
+impl Pairs {
+    /// Each pair of `recording` fitted like the first (`unit`), their errors in its frame. `None` if there is only one, or if turns that two of them share are too few.
+    ///
+    /// # Errors
+    /// The samples cannot be read.
+    pub fn of(recording: &Recording, unit: &Fit, search: DwellSearch) -> Result<Option<Self>> {
+        let triads = recording.triads();
         let kinds = [TriadKind::Gyro, TriadKind::Accel];
-        kinds.iter().all(|kind| {
-            triads.contains(&TriadName {
+        let has = |number| {
+            let mut names = kinds.iter().map(|kind| TriadName {
                 kind: *kind,
                 number,
-            })
-        })
-    };
-    let numbers: Vec<u8> = (2..=TriadName::MOST).filter(|n| has(*n)).collect();
-    let body = match numbers.is_empty() {
-        true => None,
-        false => Body::of(recording, unit, &Options::default())?,
-    };
-    let Some(body) = body else {
-        return Ok(None);
-    };
-    let mut others = Vec::new();
-    for number in numbers {
-        let gyro = TriadName {
-            kind: TriadKind::Gyro,
-            number,
+            });
+            names.all(|name| triads.contains(&name))
         };
-        let placed = body.triads.iter().find(|triad| triad.name == gyro);
-        let Some(placed) = placed else {
-            continue;
+        let numbers: Vec<u8> = (2..=TriadName::MOST).filter(|n| has(*n)).collect();
+        let body = match numbers.is_empty() {
+            true => None,
+            false => Body::of(recording, unit, &Options::default())?,
         };
-        let prepared = Prepared::read(&recording.pair(number)?, search, |_| ())?;
-        // A pair that is not determined for itself says nothing of turns.
-        if let Ok(fit) = mimu::fit::fit(prepared, mimu::fit::Options::IN_SAMPLE) {
-            // The accelerometer of the pair gives the frame of its fit.
-            let own = TriadName {
-                kind: TriadKind::Accel,
-                number,
+        let Some(body) = body else {
+            return Ok(None);
+        };
+        let mut others = Vec::new();
+        for number in numbers {
+            // The accelerometer of a pair gives the frame of its fit.
+            let [gyro, accel] = kinds.map(|kind| {
+                let name = TriadName { kind, number };
+                body.triads.iter().find(|triad| triad.name == name)
+            });
+            let Some(gyro) = gyro else {
+                continue;
             };
-            let accel = body.triads.iter().find(|triad| triad.name == own);
-            let rotation = accel.map_or(placed.rotation, |accel| accel.rotation);
-            others.push((number, fit, rotation));
+            let prepared = Prepared::read(&recording.pair(number)?, search, |_| ())?;
+            // A pair that is not determined for itself says nothing of turns.
+            if let Ok(fit) = fit(prepared, FitOptions::IN_SAMPLE) {
+                others.push((number, fit, accel.unwrap_or(gyro).rotation));
+            }
         }
+        let first = [(1, unit, Rotation3::identity())].into_iter();
+        let others = others
+            .iter()
+            .map(|(number, fit, turn)| (*number, fit, *turn));
+        let all: Vec<_> = first.chain(others).collect();
+        let errors = split::turn_errors(&all);
+        let Some((errors, mut split)) = errors.and_then(|of| split::split(&of).map(|s| (of, s)))
+        else {
+            return Ok(None);
+        };
+        let mut first = None;
+        if split.exceeds_noise {
+            for (number, prepared) in split::own_turns(&all, &errors) {
+                if number == 1 {
+                    first = Some(prepared.clone());
+                }
+                if let Ok(fit) = fit(prepared, FitOptions::default()) {
+                    split.judged.insert(number, FitResult::of(&fit).judgement);
+                }
+            }
+        }
+        Ok(Some(Self { split, first }))
     }
-    let first = [(1, unit, Rotation3::identity())].into_iter();
-    let others = others
-        .iter()
-        .map(|(number, fit, turn)| (*number, fit, *turn));
-    let all: Vec<_> = first.chain(others).collect();
-    Ok(split::turn_errors(&all).as_ref().and_then(split::split))
 }
 
 /// The calibrations of the first two, and their readings.

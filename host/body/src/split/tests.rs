@@ -98,6 +98,7 @@ impl Simulated {
         TurnErrors {
             pairs: pairs.collect(),
             shared: vec![self.shared.powi(2); TURNS],
+            places: Vec::new(),
             conditions: conditions.clone(),
         }
     }
