@@ -17,6 +17,7 @@ mod relation;
 pub mod result;
 mod same_body;
 mod series;
+mod sessions;
 pub mod split;
 mod standing;
 mod verify;
@@ -122,6 +123,12 @@ impl Body {
             }
         }
         Ok(Some(body))
+    }
+
+    /// The names of its further triads.
+    fn names(&self) -> impl Iterator<Item = TriadName> + '_ {
+        let refused = self.refused.iter().map(|(name, _)| *name);
+        self.triads.iter().map(|triad| triad.name).chain(refused)
     }
 
     /// The worst of its judgements.
