@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use mimu::quantity::Sensor;
 use mimu_cli::called::{FitArgs, FitMade, SessionsMade, of_contents};
-use mimu_cli::report::{self, fragment};
+use mimu_cli::report::fragment;
 use pyo3::prelude::*;
 
 use crate::calibration::Calibration;
