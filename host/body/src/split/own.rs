@@ -57,11 +57,12 @@ impl TurnErrors {
         let others = others.filter(|(k, (pair, _))| *k != i && is_known(&pair.errors[j]));
         let (mut sum, mut weights) = (Vector3::zeros(), 0.0);
         for (_, (pair, own)) in others {
-            let noise = pair.noise[j].trace();
-            let weight = own.max(noise).recip();
+            // A pair that agrees with the others by chance is no better than a hundredth of what it errs by.
+            let least = 1e-4 * pair.errors[j].norm_squared();
+            let weight = own.max(pair.noise[j].trace()).max(least).recip();
             sum += weight * pair.errors[j];
             weights += weight;
         }
-        (weights > 0.0).then(|| (sum / weights, 0.5 / weights))
+        (weights > 0.0 && weights.is_finite()).then(|| (sum / weights, 0.5 / weights))
     }
 }

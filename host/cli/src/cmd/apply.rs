@@ -13,7 +13,7 @@ use crate::arguments::JsonArgs;
 use crate::hint::OF_A_LOG;
 use crate::output::{check_outputs, print, progress};
 use crate::reading::{LogArgs, imported_to, named, open};
-use crate::report;
+use crate::report::{self, Joined};
 
 #[derive(Args)]
 pub(crate) struct ApplyArgs {
@@ -51,19 +51,14 @@ pub(crate) fn run(args: &ApplyArgs) -> Result<()> {
         false => written(args, &calibration)?,
     };
     let mut text = report::apply_text(&applied);
-    match mean {
-        None => print(&args.json, &text, &applied, None),
-        Some(mean) => {
-            text += &report::mean_text(&mean);
-            let mean = serde_json::json!({ "mean": mean });
-            print(
-                &args.json,
-                &text,
-                &report::with_sensors(&applied, &mean),
-                None,
-            )
-        }
-    }
+    text.extend(mean.as_ref().map(report::mean_text));
+    let mean = mean.map(|mean| serde_json::json!({ "mean": mean }));
+    print(
+        &args.json,
+        &text,
+        &Joined::of(&applied, mean.as_ref()),
+        None,
+    )
 }
 
 type Made = (Applied, Option<MeanUnit>);

@@ -29,7 +29,7 @@ use crate::arguments::{
 use crate::hint::OF_A_LOG;
 use crate::output::{Results, now, progress};
 use crate::reading::{LogArgs, read_samples};
-use crate::report::refused;
+use crate::report::{Joined, refused};
 use crate::status::Status;
 
 /// Arguments of `mimu diagnose`.
@@ -241,10 +241,8 @@ pub fn run(args: &DiagnoseArgs, command_line: &str) -> Result<Status> {
         let made = Made::of(&args.recordings, command_line);
         Ok(report::diagnosis_page(found, &made))
     })?;
-    match further(pairs.map(|pairs| pairs.split), delay) {
-        None => out.print(&args.json, found)?,
-        Some(more) => out.print(&args.json, &report::with_sensors(found, &more))?,
-    }
+    let more = further(pairs.map(|pairs| pairs.split), delay);
+    out.print(&args.json, &Joined::of(found, more.as_ref()))?;
     match refusal {
         Some(error) => Err(error),
         None => Ok(args.strict.status(&found.judgement)),

@@ -34,7 +34,7 @@ use crate::reading::{LogArgs, open, read_with_samples};
 use crate::report;
 use crate::report::budget::budget_text;
 use crate::report::data_sheet::{WithDataSheet, data_sheet_text};
-use crate::report::refused;
+use crate::report::{Joined, refused};
 use crate::status::Status;
 
 /// Arguments of `mimu fit`.
@@ -301,23 +301,6 @@ impl SessionsMade {
     }
 }
 
-/// A result as JSON, alone or with the further triads.
-#[derive(Serialize)]
-#[serde(untagged)]
-enum Joined<'a, T> {
-    Alone(&'a T),
-    Body(serde_json::Value),
-}
-
-impl<'a, T: Serialize> Joined<'a, T> {
-    fn of(result: &'a T, body: Option<&BodyResult>) -> Self {
-        match body {
-            Some(body) => Self::Body(report::with_sensors(result, body)),
-            None => Self::Alone(result),
-        }
-    }
-}
-
 impl FitMade {
     /// Its result as JSON.
     pub fn json(&self) -> impl Serialize {
@@ -408,7 +391,7 @@ fn body_alone(
         "not_calibrated": why.to_string(),
         "raw_unit": raw,
     });
-    let all = report::with_sensors(&head, &more);
+    let all = Joined::of(&head, Some(&more));
     let made = || Calibration::of_body(manifest, body.tables(raw), judgement.clone(), &now());
     write(args, text, &all, &judgement, &samples.place, made)
 }

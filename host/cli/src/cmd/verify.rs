@@ -1,6 +1,7 @@
 //! `mimu verify`.
 
 use std::cell::RefCell;
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -11,6 +12,8 @@ use mimu::judgement::Judgement;
 use mimu::noise::noise_file::NoiseFile;
 use mimu::prepared::Prepared;
 use mimu::signal::stillness::DwellSearch;
+use mimu_body::TriadVerification;
+use mimu_recording::Recording;
 use mimu_recording::error::Result;
 use serde::Serialize;
 use serde_json::json;
@@ -21,8 +24,8 @@ use crate::arguments::{
 use crate::hint::OF_A_LOG;
 use crate::output::print;
 use crate::reading::{LogArgs, read_with_samples};
-use crate::report;
 use crate::report::data_sheet::{WithDataSheet, data_sheet_text};
+use crate::report::{self, Joined};
 use crate::status::Status;
 
 /// Arguments of `mimu verify`.
@@ -64,21 +67,14 @@ pub(crate) fn run(args: &VerifyArgs) -> Result<Status> {
     };
     let noise = args.noise.read()?;
     let made = args.judged(&open, noise.as_ref(), &calibration)?;
-    let further = samples
-        .take()
-        .map(|of| mimu_body::verify(&of, &calibration));
-    let further = further.transpose()?.unwrap_or_default();
-    let text = made.text(args.verbose.verbose);
-    if further.is_empty() {
-        print(&args.json, &text, &made.json(), None)?;
-    } else {
-        let text = text + &report::body_errors_text(&further);
-        let all = report::with_sensors(&made.json(), &json!({ "sensors": further }));
-        print(&args.json, &text, &all, None)?;
-    }
-    let judged = further.into_values().map(|of| of.judgement);
-    let all = Judgement::worst([made.result.judgement.clone()].into_iter().chain(judged));
-    Ok(args.strict.status(&all.unwrap_or(made.result.judgement)))
+    let made = made.with_body(samples.take().as_ref(), &calibration)?;
+    print(
+        &args.json,
+        &made.text(args.verbose.verbose),
+        &made.json(),
+        None,
+    )?;
+    Ok(args.strict.status(&made.judgement()))
 }
 
 impl VerifyArgs {
@@ -97,6 +93,7 @@ impl VerifyArgs {
         Ok(Verified {
             result: verify(&self.whole.apply(prepared)?, calibration)?,
             sheet: part.map(|part| DataSheet::of(calibration, noise, &part)),
+            further: BTreeMap::new(),
         })
     }
 }
@@ -106,13 +103,36 @@ pub struct Verified {
     /// The verification.
     pub result: Verification,
     sheet: Option<DataSheet>,
+    further: BTreeMap<String, TriadVerification>,
 }
 
 impl Verified {
+    /// With the further triads that both the calibration and the recording have.
+    ///
+    /// # Errors
+    /// The samples cannot be read.
+    pub fn with_body(mut self, samples: Option<&Recording>, by: &Calibration) -> Result<Self> {
+        if let Some(samples) = samples {
+            self.further = mimu_body::verify(samples, by)?;
+        }
+        Ok(self)
+    }
+
+    /// The worst judgement of all triads.
+    fn judgement(&self) -> Judgement {
+        let first = self.result.judgement.clone();
+        let further = self.further.values().map(|of| of.judgement.clone());
+        further.fold(
+            first,
+            |worst, next| if next.kind > worst.kind { next } else { worst },
+        )
+    }
+
     /// Its result as JSON.
     pub fn json(&self) -> impl Serialize {
+        let further = (!self.further.is_empty()).then(|| json!({ "sensors": self.further }));
         WithDataSheet {
-            result: &self.result,
+            result: Joined::of(&self.result, further.as_ref()),
             data_sheet: self.sheet.as_ref(),
         }
     }
@@ -120,6 +140,9 @@ impl Verified {
     /// What the command prints.
     pub fn text(&self, verbose: bool) -> String {
         let mut text = report::verify_text(&self.result, verbose);
+        if !self.further.is_empty() {
+            text += &report::body_errors_text(&self.further);
+        }
         text.extend(self.sheet.as_ref().map(data_sheet_text));
         text
     }

@@ -31,7 +31,7 @@ pub fn apply_text(applied: &Applied) -> String {
                     (of.triad) ": in " (of.unit) ", "
                     @if let Some(frame) = of.frame { "in the frame of " (frame) } @else { "in its own frame" }
                     @if let Some(delay) = of.delay_ms { ", moved by its delay of " (significant(delay)) " ms" }
-                    @if of.empty > 0 { "; " (plural(of.empty, "sample")) " without a reading, left empty" }
+                    @if of.empty > 0 { "; " (plural(of.empty, "sample")) " without a reading or beside one at a rail, left empty" }
                 }
             }
         }

@@ -42,10 +42,9 @@ pub(crate) fn delay_text(delay_ms: &Estimate) -> String {
         true => ("later", delay_ms.value),
         false => ("earlier", -delay_ms.value),
     };
+    let [ms, interval] = [ms, delay_ms.interval].map(significant);
     format!(
-        "\nthe accelerometer's readings are {later} than the gyro's by {} ± {} ms, by the velocities that its turns begin and end with\n",
-        significant(ms),
-        significant(delay_ms.interval)
+        "\naccelerometer: {ms} ± {interval} ms {later} than the gyro, by the velocity at rest around turns\n"
     )
 }
 
@@ -99,17 +98,29 @@ fn common_cause(split: &Split) -> String {
     }
 }
 
-/// A result with the further triads among its sensors, as JSON.
-pub(crate) fn with_sensors(result: &impl Serialize, more: &impl Serialize) -> Value {
-    let [mut all, more] = [json!(result), json!(more)];
-    let further = more.as_object().into_iter().flatten();
-    for (key, value) in further {
-        match (all[key].as_object_mut(), value.as_object()) {
-            (Some(own), Some(value)) => own.extend(value.clone()),
-            _ => all[key] = value.clone(),
+/// A result as JSON: alone, or with the further triads among its sensors.
+#[derive(Serialize)]
+#[serde(untagged)]
+pub(crate) enum Joined<'a, T> {
+    Alone(&'a T),
+    Body(Value),
+}
+
+impl<'a, T: Serialize> Joined<'a, T> {
+    /// Of a result, and what a body adds to it.
+    pub fn of(result: &'a T, more: Option<&impl Serialize>) -> Self {
+        let Some(more) = more else {
+            return Self::Alone(result);
+        };
+        let [mut all, more] = [json!(result), json!(more)];
+        for (key, value) in more.as_object().into_iter().flatten() {
+            match (all[key].as_object_mut(), value.as_object()) {
+                (Some(own), Some(value)) => own.extend(value.clone()),
+                _ => all[key] = value.clone(),
+            }
         }
+        Self::Body(all)
     }
-    all
 }
 
 /// The section of a document.
