@@ -244,8 +244,9 @@ def fit(
     placement: float | None = None,
     reference_error: Path | None = None,
     part: Path | None = None,
+    field: float | None = None,
 ) -> Fit:
-    """Calibrates the gyro and the accelerometer of a recording, as ``mimu fit`` does.
+    """Calibrates the gyro and the accelerometer of a recording, and the further triads if it has any, as ``mimu fit`` does.
 
     Parameters
     ----------
@@ -273,6 +274,9 @@ def fit(
         How well the true inputs are known: tilt of a table, right angles, rate, gravity.
     part : str or path, optional
         Part whose data sheet the unit is compared with: a name as ``"icm42688p"``, or a file. ``to_dict()["data_sheet"]`` has the comparison.
+    field : float, optional
+        Size of the Earth's field at the place, µT, for a recording with a magnetometer; without it the field counts as 1. ``to_dict()["body"]`` has the places of the
+        further triads, ``to_dict()["sensors"]`` their parameters.
 
     Returns
     -------
@@ -291,7 +295,7 @@ def fit(
     """
     options = dict(
         holdout=holdout, only=only, still=still, steps=steps, keep=kept(keep), prior=prior, whole_turns=whole_turns,
-        placement=placement, reference_error=reference_error, part=part,
+        placement=placement, reference_error=reference_error, part=part, field=field,
     )
     return Fit(_mimu.fit(recording, arguments(options), noise=noise_of(noise)))
 
@@ -322,6 +326,7 @@ def fit_sessions(
     still: float | None = None,
     steps: Steps | None = None,
     noise: NoiseLike | None = None,
+    field: float | None = None,
 ) -> SessionsFit:
     """Makes one calibration of several sessions of a unit, as ``mimu fit S1 S2 ...`` does.
 
@@ -331,7 +336,7 @@ def fit_sessions(
         In the order in which they took place. The unit was switched off between them.
     part_class : {"consumer", "tactical"}
         How much such parts change between power-ons: used for one or two sessions.
-    holdout, still, steps, noise
+    holdout, still, steps, noise, field
         As for :func:`mimu.fit`.
 
     Returns
@@ -339,5 +344,5 @@ def fit_sessions(
     SessionsFit
         Look at ``judgement`` and ``findings`` first; ``parameters["gyro"]["bias_x"]["next_power_on"]`` is the interval of tomorrow.
     """
-    options = {"class": part_class, "holdout": holdout, "still": still, "steps": steps}
+    options = {"class": part_class, "holdout": holdout, "still": still, "steps": steps, "field": field}
     return SessionsFit(_mimu.fit_sessions(several(recordings), arguments(options), noise=noise_of(noise)))

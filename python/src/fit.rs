@@ -4,9 +4,8 @@ use std::ffi::OsString;
 use std::sync::Arc;
 
 use mimu::quantity::Sensor;
-use mimu::result::sessions::SessionsResult;
-use mimu_cli::called::{FitArgs, FitMade, of_contents};
-use mimu_cli::report::{self, fragment};
+use mimu_cli::called::{FitArgs, FitMade, SessionsMade, of_contents};
+use mimu_cli::report::fragment;
 use pyo3::prelude::*;
 
 use crate::calibration::Calibration;
@@ -72,7 +71,7 @@ impl Fit {
 /// A calibration of several sessions.
 #[pyclass(frozen, module = "mimu._mimu")]
 pub(crate) struct SessionsFit {
-    result: SessionsResult,
+    made: SessionsMade,
     model: Arc<mimu::Calibration>,
 }
 
@@ -80,24 +79,24 @@ pub(crate) struct SessionsFit {
 impl SessionsFit {
     /// JSON of the result, as `mimu fit --json` writes it for several recordings.
     fn json(&self) -> PyResult<String> {
-        json(&self.result)
+        json(&self.made.json())
     }
 
     /// The text that `mimu fit` prints.
     fn text(&self) -> String {
-        report::sessions_text(&self.result, false)
+        self.made.text(false)
     }
 
     /// The text as a page has it.
     fn html(&self) -> String {
-        fragment::of_sessions(&self.result)
+        fragment::of_sessions(&self.made.result)
     }
 
     /// The calibration that it gives.
     fn calibration(&self) -> Calibration {
         Calibration {
             model: self.model.clone(),
-            name: format!("sessions of {}", self.result.device),
+            name: format!("sessions of {}", self.made.result.device),
             units: None,
         }
     }
@@ -112,11 +111,12 @@ pub(crate) fn fit(
     arguments: Vec<OsString>,
     noise: Option<&Noise>,
 ) -> PyResult<Fit> {
-    let (open, units) = (recording.source.opener(), recording.units.clone());
+    let (source, units) = (recording.source.clone(), recording.units.clone());
     let noise = noise.map(|noise| noise.file.clone());
     let work = move || {
         let args: FitArgs = of_contents("fit", arguments)?;
-        Ok(args.fitted(&*open, noise.as_deref())?)
+        let samples = source.samples().ok().map(|samples| &**samples);
+        Ok(args.fitted((&*source.opener(), samples), noise.as_deref())?)
     };
     let made = done(py, work, refused)?;
     let model = Arc::new(made.calibration.clone());
@@ -132,18 +132,17 @@ pub(crate) fn fit_sessions(
     arguments: Vec<OsString>,
     noise: Option<&Noise>,
 ) -> PyResult<SessionsFit> {
-    let open: Vec<_> = sources(py, &recordings)?
-        .iter()
-        .map(|s| s.opener())
-        .collect();
+    let sources = sources(py, &recordings)?;
     let noise = noise.map(|noise| noise.file.clone());
     let work = move || {
         let args: FitArgs = of_contents("fit", arguments)?;
+        let open = sources.iter();
+        let open: Vec<_> = open
+            .map(|s| (s.opener(), s.samples().ok().map(|samples| &**samples)))
+            .collect();
         Ok(args.combined(&open, noise.as_deref())?)
     };
-    let (result, model) = done(py, work, refused)?;
-    Ok(SessionsFit {
-        result,
-        model: Arc::new(model),
-    })
+    let made = done(py, work, refused)?;
+    let model = Arc::new(made.calibration.clone());
+    Ok(SessionsFit { made, model })
 }

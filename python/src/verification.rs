@@ -47,11 +47,13 @@ pub(crate) fn verify(
     arguments: Vec<OsString>,
     noise: Option<&Noise>,
 ) -> PyResult<Verification> {
-    let (open, model) = (recording.source.opener(), calibration.model.clone());
+    let (source, model) = (recording.source.clone(), calibration.model.clone());
     let noise = noise.map(|noise| noise.file.clone());
     let work = move || {
         let args: VerifyArgs = of_contents("verify", arguments)?;
-        Ok(args.judged(&*open, noise.as_deref(), &model)?)
+        let made = args.judged(&*source.opener(), noise.as_deref(), &model)?;
+        let samples = source.samples().ok().map(|samples| &**samples);
+        Ok(made.with_body(samples)?)
     };
     Ok(Verification {
         verified: done(py, work, refused)?,

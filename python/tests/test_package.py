@@ -33,9 +33,9 @@ OF_FILES = {"json", "strict", "verbose", "replace", "force"}
 @pytest.mark.parametrize(
     ("function", "subcommand", "elsewhere"),
     [
-        # The objects, and destinations of the result. The further triads of a body are the command's.
-        (mimu.fit, "fit", OF_FILES | {"class", "dwells", "o", "field"}),
-        (mimu.fit_sessions, "fit", OF_FILES | {"class", "dwells", "o", "field", "only", "keep", "prior", "whole_turns", "placement", "reference_error", "part"}),
+        # The objects, and destinations of the result.
+        (mimu.fit, "fit", OF_FILES | {"class", "dwells", "o"}),
+        (mimu.fit_sessions, "fit", OF_FILES | {"class", "dwells", "o", "only", "keep", "prior", "whole_turns", "placement", "reference_error", "part"}),
         (mimu.verify, "verify", OF_FILES),
         (mimu.diagnose, "diagnose", OF_FILES | {"o", "page", "plan", "next"}),
         (mimu.allan, "allan", OF_FILES | {"from", "to", "plot", "o"}),

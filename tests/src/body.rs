@@ -34,6 +34,8 @@ pub enum Disturbance {
     Desk(f64),
     /// A phone that is put beside it after 80 s, and stays there.
     Phone(f64),
+    /// A phone that is put beside it after 80 s, and taken away after so many more.
+    Passing(f64, f64),
 }
 
 /// Distance of steel and phone, m.
@@ -43,10 +45,11 @@ const PHONE_S: f64 = 80.0;
 
 impl Disturbance {
     fn magnet(self, random: &mut Random) -> Option<MagnetTruth> {
-        let (size_ut, from_s) = match self {
+        let (size_ut, from_s, to_s) = match self {
             Self::None => return None,
-            Self::Desk(size_ut) => (size_ut, 0.0),
-            Self::Phone(size_ut) => (size_ut, PHONE_S),
+            Self::Desk(size_ut) => (size_ut, 0.0, f64::INFINITY),
+            Self::Phone(size_ut) => (size_ut, PHONE_S, f64::INFINITY),
+            Self::Passing(size_ut, stay_s) => (size_ut, PHONE_S, PHONE_S + stay_s),
         };
         let beside = random.attitude().turn([1.0, 0.0, 0.0]);
         let [x, y, z] = match self {
@@ -60,7 +63,7 @@ impl Disturbance {
             at_m: [x / away, y / away, z / away],
             moment_am2: scale(moment / (away * AWAY_M), [x, y, z]),
             from_s,
-            to_s: f64::INFINITY,
+            to_s,
         })
     }
 }
@@ -159,6 +162,8 @@ pub struct Found {
     pub parameters: Vec<Parameter>,
     /// What was not given, and why.
     pub open: Vec<String>,
+    /// Times that were left out, s.
+    pub left_out: Vec<[f64; 2]>,
 }
 
 impl Found {
@@ -283,6 +288,7 @@ pub fn case(file: &RigFile, seed: u64) -> Vec<Found> {
             judgement: triad.judgement.clone(),
             parameters: errors(triad, &relation, wander[k], truth.field.dip_deg),
             open: open.into_iter().flatten().cloned().collect(),
+            left_out: triad.left_out.clone(),
         }
     });
     let refused = body.refused.into_iter().map(|(name, judgement)| Found {
@@ -290,6 +296,7 @@ pub fn case(file: &RigFile, seed: u64) -> Vec<Found> {
         judgement,
         parameters: Vec::new(),
         open: Vec::new(),
+        left_out: Vec::new(),
     });
     fitted.chain(refused).collect()
 }
@@ -372,6 +379,10 @@ pub fn table(bodies: &[Vec<Found>]) -> String {
         for open in &found.open {
             let open = format!("open: {open}");
             *judgements.entry((found.name, open)).or_default() += 1;
+        }
+        if !found.left_out.is_empty() {
+            let left_out = format!("with time left out, {}", found.judgement.kind.name());
+            *judgements.entry((found.name, left_out)).or_default() += 1;
         }
     }
     for ((name, said), count) in judgements {

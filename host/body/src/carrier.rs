@@ -19,6 +19,18 @@ pub(crate) struct Rest {
     pub up: Vector3<f64>,
 }
 
+impl Rest {
+    /// Its times, s.
+    pub fn span(&self) -> [f64; 2] {
+        [self.from_s, self.to_s]
+    }
+
+    /// The instant in its middle, s.
+    pub fn middle(&self) -> f64 {
+        0.5 * (self.from_s + self.to_s)
+    }
+}
+
 /// Compensated readings, SI.
 pub(crate) struct Carrier {
     motion: Option<Motion>,

@@ -50,14 +50,8 @@ impl Solution {
 }
 
 impl Clusters {
-    /// So many clusters and parameters. `known`: standard deviations of what is known beforehand, infinite for nothing, around `value` of which the
-    /// parameters are now at `at`.
-    pub fn new(
-        count: usize,
-        at: &DVector<f64>,
-        value: &DVector<f64>,
-        known: &DVector<f64>,
-    ) -> Self {
+    /// So many clusters, and parameters that are now at `at`. `known`: standard deviations of what is known beforehand around zero, infinite for nothing.
+    pub fn new(count: usize, at: &DVector<f64>, known: &DVector<f64>) -> Self {
         let n = at.len();
         let precision = known.map(|sigma| sigma.powi(-2));
         Self {
@@ -70,7 +64,7 @@ impl Clusters {
                 };
                 count
             ],
-            pull: precision.component_mul(&(value - at)),
+            pull: -precision.component_mul(at),
             known: precision,
         }
     }
@@ -205,7 +199,7 @@ mod tests {
     /// A line through residuals of 40 clusters of ten, each with an error in common: its slope and the standard deviation of that.
     fn line(seed: usize) -> (f64, f64) {
         let zero = DVector::zeros(2);
-        let mut clusters = Clusters::new(40, &zero, &zero, &DVector::repeat(2, f64::INFINITY));
+        let mut clusters = Clusters::new(40, &zero, &DVector::repeat(2, f64::INFINITY));
         for g in 0..40 {
             for k in 0..10 {
                 let x = g as f64 / 20.0 - 1.0;
@@ -230,7 +224,7 @@ mod tests {
     #[test]
     fn a_cluster_is_judged_by_a_solution_without_it() {
         let zero = DVector::zeros(1);
-        let mut clusters = Clusters::new(3, &zero, &zero, &DVector::repeat(1, f64::INFINITY));
+        let mut clusters = Clusters::new(3, &zero, &DVector::repeat(1, f64::INFINITY));
         for (g, y) in [1.0, 2.0, 6.0].into_iter().enumerate() {
             clusters.add(g, y, &DVector::repeat(1, 1.0), 1.0);
         }
@@ -246,7 +240,7 @@ mod tests {
     #[test]
     fn parameters_that_nothing_determines_are_told() {
         let zero = DVector::zeros(2);
-        let mut clusters = Clusters::new(1, &zero, &zero, &DVector::repeat(2, f64::INFINITY));
+        let mut clusters = Clusters::new(1, &zero, &DVector::repeat(2, f64::INFINITY));
         clusters.add(0, 1.0, &DVector::from_vec(vec![1.0, 1.0]), 1.0);
         clusters.add(0, 1.0, &DVector::from_vec(vec![2.0, 2.0]), 1.0);
         assert!(clusters.solve(&[true]).is_none());

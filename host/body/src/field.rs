@@ -5,14 +5,16 @@
 //! gravity is one constant, the dip. An ellipsoid alone, the usual calibration, is the first of these: it leaves a rotation open, and a field that differs by place bends it
 //! unnoticed, where the turns contradict it.
 
-use mimu::triad::{Part, affine, vector};
+use mimu::triad::{Estimate, affine};
 use mimu_core::compensation::Affine;
 use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, Vector3};
 
 use crate::carrier::Rest;
-use crate::clustered::{Clusters, Solution};
+use crate::clustered::Clusters;
 use crate::errors::Errors;
-use crate::pieces::{Groups, Pieces};
+use crate::fitted::Known;
+use crate::pieces::{Groups, Pieces, joined};
+use crate::relation::{DELAY, Equations, Relation};
 use crate::series::{Motion, Series};
 use crate::standing::Standing;
 
@@ -26,12 +28,14 @@ const LEAST_TURN: f64 = 0.05;
 const DELAY_S: f64 = 0.1;
 /// Step of the derivative by the delay, s.
 const DELAY_STEP_S: f64 = 1e-3;
-const STEPS: usize = 30;
-const SETTLED_S: f64 = 1e-6;
-const LONGEST_STEP_S: f64 = 0.05;
+/// A rest whose size or dip of the field is off by this many times the scatter of all rests is left out.
+const CONTRADICTED: f64 = 6.0;
+/// Fewest rests that show a scatter.
+const FEWEST_RESTS: usize = 6;
+/// How often rests that the others contradict are looked for.
+const ROUNDS: usize = 3;
 
-/// Parameters: C by rows, o, delay (s), sine of the dip, and what remains of the gyro's bias (rad/s).
-const DELAY: usize = 12;
+/// The parameters behind the delay: sine of the dip, and what remains of the gyro's bias (rad/s).
 const DIP: usize = 13;
 const BIAS: usize = 14;
 const COUNT: usize = 17;
@@ -42,29 +46,30 @@ const DIPS: usize = 2;
 
 /// A calibrated magnetometer.
 pub(crate) struct Field {
-    /// C and o, raw to the unit of `size`, in the frame of the body.
-    pub calibration: Affine<f64>,
-    /// Covariance of all parameters by the jackknife, and its degrees of freedom.
-    pub covariance: DMatrix<f64>,
-    pub dof: f64,
-    /// Delay behind the gyro, s, and sine of the dip.
-    pub delay_s: f64,
-    pub dip_sine: f64,
-    /// Share of what was known beforehand that the delay still has as its standard deviation.
-    pub delay_undetermined: f64,
+    /// Its relation to the gyro.
+    pub relation: Relation,
     /// Number of rests that show the dip.
     pub rests: usize,
-    /// Errors of an axis after a turn, in the unit of the field.
-    pub errors: Errors,
-    /// Rms error of its size, in the same unit: what differs by place changes little during a turn, and shows here.
+    /// Rms error of its size, in its unit: what differs by place changes little during a turn, and shows here.
     pub size_rms: f64,
-    pub left_out: Vec<[f64; 2]>,
-    /// Share of the pieces of time that is left out.
-    pub left_out_share: f64,
+    /// What was left out.
+    pub left_out: LeftOut,
     /// By how much the field differs between the calibrations of the two halves of the recording, rms, rad.
     pub halves_rad: f64,
     /// Worst standard deviation of the field's direction, over all poses, rad.
     pub worst_rad: f64,
+}
+
+/// Time in which the rest contradicts the field.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct LeftOut {
+    /// Pieces of time and rests, s.
+    pub spans: Vec<[f64; 2]>,
+    /// Their share of the time.
+    pub share: f64,
+    /// Rms error of the size of the field there, as a share of it, and of its direction after a turn or at a rest, rad.
+    pub size: f64,
+    pub angle_rad: f64,
 }
 
 struct Problem<'a> {
@@ -74,8 +79,8 @@ struct Problem<'a> {
     used: Vec<usize>,
     /// Pairs of samples that a turn lies between.
     pairs: Vec<[usize; 2]>,
-    /// Mean readings of rests, with up and time.
-    rests: Vec<(Vector3<f64>, Vector3<f64>, f64)>,
+    /// Mean readings at rests.
+    rests: Vec<(Vector3<f64>, Rest)>,
     pieces: Pieces,
     size: f64,
     /// Standard deviation of what remains of the gyro's bias, rad/s.
@@ -87,22 +92,33 @@ struct Problem<'a> {
 impl Field {
     /// Of raw readings. `size`: that of the field, in the unit of the result; `bias`: standard deviation of what remains of the gyro's, rad/s. `None` if too
     /// little of it turns.
-    pub fn of(raw: Series, motion: &Motion, rests: &[Rest], size: f64, bias: f64) -> Option<Self> {
-        let problem = Problem::new(raw, motion, rests, size, bias)?;
-        let mut at = problem.start()?;
-        let mut groups = Groups::default();
-        let mut used = vec![true; problem.pieces.count];
-        let mut solution = None;
-        for round in 0..6 {
-            solution = Some(problem.settle(&mut at, &mut groups, &used)?);
-            let held = &solution.as_ref()?.held_out;
-            let next = problem.pieces.kept(held);
-            if round == 5 || next == used {
-                break;
+    pub fn of(raw: &Series, motion: &Motion, rests: &[Rest], size: f64, bias: f64) -> Option<Self> {
+        let mut left: Vec<[f64; 2]> = Vec::new();
+        for round in 0.. {
+            let problem = Problem::new(raw.without(&left), motion, rests, size, bias)?;
+            let relation = Relation::of(&problem, problem.start()?)?;
+            let more = problem.contradicted(&relation);
+            if more.is_empty() || round == ROUNDS {
+                let all = Problem::new(raw.clone(), motion, rests, size, bias)?;
+                let left_out = all.left_out(&relation, left);
+                return problem.field(relation, left_out);
             }
-            used = next;
+            left.extend(more.iter().map(Rest::span));
         }
-        problem.field(&at, &solution?, &mut groups, &used)
+        None
+    }
+
+    /// Angle of the field below the level, degrees.
+    pub fn dip_deg(&self) -> Known<Estimate> {
+        if self.rests == 0 {
+            return Err("no rest shows where up is".into());
+        }
+        let sine = self.relation.at[DIP].clamp(-0.999_999, 0.999_999);
+        let by_sine = (1.0 - sine * sine).sqrt().recip().to_degrees();
+        Ok(Estimate {
+            value: sine.asin().to_degrees(),
+            ..self.relation.estimate(DIP, by_sine)
+        })
     }
 
     /// Errors of a magnetometer that stands so; the rms error of the size of the field, and that size: `size`, or else the mean that it reads. `None` if nothing
@@ -117,26 +133,10 @@ impl Field {
         let sizes = raw.x.iter().map(|u| standing.calibration.apply(u).norm());
         let size = size.unwrap_or(sizes.sum::<f64>() / raw.len() as f64);
         let problem = Problem::new(raw, motion, &[], size, 1e-9)?;
-        let mut at = DVector::zeros(COUNT);
-        let Affine { matrix, offset } = standing.calibration;
-        at.fixed_rows_mut::<12>(0)
-            .copy_from(&vector(&matrix, &offset));
-        at[DELAY] = standing.delay_s;
         let all = vec![true; problem.pieces.count];
-        let errors = problem.errors(&at, &all)?;
-        Some((
-            errors,
-            [problem.size_rms(&standing.calibration, &all), size],
-        ))
-    }
-
-    /// The part of the covariance of C and o.
-    pub fn part(&self) -> Part {
-        Part {
-            covariance: self.covariance.fixed_view::<12, 12>(0, 0).into_owned(),
-            dof: self.dof,
-            known: 0.0,
-        }
+        let errors = problem.errors(&standing.parameters(COUNT), &all)?;
+        let size_rms = problem.size_rms(&standing.calibration, |_| true);
+        Some((errors, [size_rms, size]))
     }
 }
 
@@ -174,11 +174,9 @@ impl<'a> Problem<'a> {
             }
         }
         let mean = |rest: &Rest| {
-            let from = raw.t.partition_point(|t| *t < rest.from_s);
-            let to = raw.t.partition_point(|t| *t <= rest.to_s);
-            let own = raw.x.get(from..to).filter(|own| !own.is_empty())?;
-            let mean = own.iter().sum::<Vector3<f64>>() / own.len() as f64;
-            Some((mean, rest.up, 0.5 * (rest.from_s + rest.to_s)))
+            let own = raw.x.get(raw.within(rest.span()))?;
+            let own = Some(own).filter(|own| !own.is_empty())?;
+            Some((own.iter().sum::<Vector3<f64>>() / own.len() as f64, *rest))
         };
         Some(Self {
             rests: rests.iter().filter_map(mean).collect(),
@@ -235,7 +233,7 @@ impl<'a> Problem<'a> {
         let sines = self
             .rests
             .iter()
-            .map(|(u, up, _)| -up.dot(&calibration.apply(u)) / self.size);
+            .map(|(u, rest)| -rest.up.dot(&calibration.apply(u)) / self.size);
         at[DIP] = sines.sum::<f64>() / self.rests.len().max(1) as f64;
         at.iter().all(|x| x.is_finite()).then_some(at)
     }
@@ -272,40 +270,151 @@ impl<'a> Problem<'a> {
         Some((seen - by_bias * bias - x1, by))
     }
 
-    fn settle(
-        &self,
-        at: &mut DVector<f64>,
-        groups: &mut Groups,
-        used: &[bool],
-    ) -> Option<Solution> {
-        let mut last = None;
-        for _ in 0..STEPS {
-            let solution = self.clusters(at, groups, used).solve(used)?;
-            let mut step = solution.step.clone();
-            let longest = step[DELAY].abs() / LONGEST_STEP_S;
-            if longest > 1.0 {
-                step /= longest;
-            }
-            *at += &step;
-            let change = step.fixed_rows::<12>(0).norm() / at.fixed_rows::<12>(0).norm();
-            last = Some(solution);
-            if step[DELAY].abs() < SETTLED_S && change < 1e-9 && groups.are_settled() {
-                break;
-            }
-        }
-        last
+    /// Rms error of the size of the field in the samples for which `of` holds.
+    fn size_rms(&self, calibration: &Affine<f64>, of: impl Fn(usize) -> bool) -> f64 {
+        let own = self.used.iter().filter(|k| of(**k));
+        let errors = own.map(|k| calibration.apply(&self.raw.x[*k]).norm() - self.size);
+        mimu_recording::statistics::root_mean_square(errors)
     }
 
-    /// Residuals of turns, sizes and dips at these parameters. Readings stand on both sides of a turn, and their noise makes C smaller than it is, by the square
-    /// of noise over field; what it adds to the gradient is known and taken out again.
-    fn clusters(&self, at: &DVector<f64>, groups: &mut Groups, used: &[bool]) -> Clusters {
+    /// Rests whose size or dip of the field the others contradict, of those in pieces of time that are used.
+    fn contradicted(&self, relation: &Relation) -> Vec<Rest> {
+        let own = self.rests.iter();
+        let own: Vec<_> = own
+            .filter(|(_, rest)| relation.used[self.pieces.of(rest.middle())])
+            .collect();
+        if own.len() < FEWEST_RESTS {
+            return Vec::new();
+        }
+        let calibration = relation.calibration();
+        let errors = [
+            own.iter()
+                .map(|(u, _)| calibration.apply(u).norm() - self.size)
+                .collect(),
+            own.iter()
+                .map(|(u, rest)| self.dip(&calibration, u, rest, relation.at[DIP]))
+                .collect(),
+        ];
+        let is_off = errors.map(|errors: Vec<f64>| {
+            let sizes = errors.iter().map(|e| e.abs()).collect();
+            // The median of the sizes of errors with a normal distribution is 0.67 of its standard deviation.
+            let sigma = mimu_recording::units::median(sizes).unwrap_or(f64::NAN) / 0.6745;
+            errors
+                .into_iter()
+                .map(|e| e.abs() > CONTRADICTED * sigma)
+                .collect::<Vec<_>>()
+        });
+        let off = own
+            .iter()
+            .enumerate()
+            .filter(|(k, _)| is_off[0][*k] || is_off[1][*k]);
+        off.map(|(_, (_, rest))| *rest).collect()
+    }
+
+    /// By how much the field along up differs from that of its dip.
+    fn dip(&self, calibration: &Affine<f64>, u: &Vector3<f64>, rest: &Rest, sine: f64) -> f64 {
+        -self.size * sine - rest.up.dot(&calibration.apply(u))
+    }
+
+    /// What `relation` leaves out of these readings, besides `rests`.
+    fn left_out(&self, relation: &Relation, rests: Vec<[f64; 2]>) -> LeftOut {
+        let spans = joined([relation.left_out.clone(), rests].concat());
+        let is_out = |k: usize| spans.iter().any(|[a, b]| (*a..*b).contains(&self.raw.t[k]));
+        let calibration = relation.calibration();
+        let turns = self
+            .pairs
+            .iter()
+            .filter(|pair| pair.iter().any(|k| is_out(*k)));
+        let turns = turns.filter_map(|pair| Some(self.turn(*pair, &relation.at)?.0.norm()));
+        let at_rest = self.rests.iter();
+        let at_rest = at_rest
+            .filter(|(_, rest)| spans.iter().any(|[a, b]| (*a..*b).contains(&rest.middle())));
+        let dips = at_rest.map(|(u, rest)| self.dip(&calibration, u, rest, relation.at[DIP]));
+        let [turns, dips] = [turns.collect::<Vec<_>>(), dips.collect()]
+            .map(mimu_recording::statistics::root_mean_square);
+        let total = self
+            .raw
+            .t
+            .last()
+            .zip(self.raw.t.first())
+            .map_or(f64::NAN, |(b, a)| b - a);
+        LeftOut {
+            share: spans.iter().map(|[a, b]| b - a).sum::<f64>() / total,
+            size: self.size_rms(&calibration, is_out) / self.size,
+            // NaN, where there is no turn or no rest, is the lesser.
+            angle_rad: turns.max(dips) / self.size,
+            spans,
+        }
+    }
+
+    fn field(&self, relation: Relation, left_out: LeftOut) -> Option<Field> {
+        let calibration = relation.calibration();
+        let used = &relation.used;
+        let clusters = self.clusters(&relation.at, &mut relation.groups.clone(), used);
+        let half = self.pieces.count / 2;
+        let halves = [true, false].map(|first| clusters.moved(|g| used[g] && (g < half) == first));
+        let halves_rad = match halves {
+            [Some(a), Some(b)] => {
+                let apart = (a - b).fixed_rows::<12>(0).into_owned();
+                let each = self.used.iter();
+                let each = each.map(|k| (by_calibration(&self.raw.x[*k]) * apart).norm_squared());
+                (each.sum::<f64>() / self.used.len() as f64).sqrt() / self.size
+            }
+            _ => f64::INFINITY,
+        };
+        let is_used = |k: usize| used[self.pieces.of(self.raw.t[k])];
+        Some(Field {
+            worst_rad: self.worst(&calibration, &relation.solution.covariance)?,
+            rests: self.rests.len(),
+            size_rms: self.size_rms(&calibration, is_used),
+            left_out,
+            halves_rad,
+            relation,
+        })
+    }
+
+    /// Worst standard deviation of the field's direction, over fields along the axes and the corners of the body, rad.
+    fn worst(&self, calibration: &Affine<f64>, covariance: &DMatrix<f64>) -> Option<f64> {
+        let forward = calibration.matrix.try_inverse()?;
+        let own = covariance.fixed_view::<12, 12>(0, 0);
+        let mut worst = 0.0;
+        for code in 0..27 {
+            let to = Vector3::new(code % 3, code / 3 % 3, code / 9).map(|c| f64::from(c) - 1.0);
+            let Some(to) = to.try_normalize(0.5) else {
+                continue;
+            };
+            let by = by_calibration(&(forward * (to * self.size - calibration.offset)));
+            let across = Matrix3::identity() - to * to.transpose();
+            let error = across * by * own * by.transpose() * across;
+            worst = f64::max(worst, error.trace());
+        }
+        Some(worst.sqrt() / self.size)
+    }
+}
+
+impl Equations for Problem<'_> {
+    fn known(&self) -> DVector<f64> {
         let mut known = DVector::repeat(COUNT, f64::INFINITY);
         known[DELAY] = DELAY_S;
         known[DIP] = 1.0;
         known.fixed_rows_mut::<3>(BIAS).fill(self.bias);
-        let mut clusters = Clusters::new(self.pieces.count, at, &DVector::zeros(COUNT), &known);
+        known
+    }
+
+    fn pieces(&self) -> &Pieces {
+        &self.pieces
+    }
+
+    /// Residuals of turns, sizes and dips. Readings stand on both sides of a turn, and their noise makes C smaller than it is, by the square
+    /// of noise over field; what it adds to the gradient is known and taken out again.
+    fn add_to(
+        &self,
+        clusters: &mut Clusters,
+        at: &DVector<f64>,
+        groups: &mut Groups,
+        used: &[bool],
+    ) {
         let calibration = affine(&at.fixed_rows::<12>(0).into_owned());
-        groups.begin();
         for pair in &self.pairs {
             let Some((residual, by)) = self.turn(*pair, at) else {
                 continue;
@@ -340,23 +449,20 @@ impl<'a> Problem<'a> {
             let own = weight * self.noise * along * along.transpose() * calibration.matrix;
             clusters.correct(piece, &of_matrix(&own));
         }
-        for (u, up, t) in &self.rests {
+        for (u, rest) in &self.rests {
             let mut by = DVector::zeros(COUNT);
             by.fixed_rows_mut::<12>(0)
-                .copy_from(&(by_calibration(u).transpose() * up));
+                .copy_from(&(by_calibration(u).transpose() * rest.up));
             by[DIP] = self.size;
-            let residual = -self.size * at[DIP] - up.dot(&calibration.apply(u));
-            let piece = self.pieces.of(*t);
+            let residual = self.dip(&calibration, u, rest, at[DIP]);
+            let piece = self.pieces.of(rest.middle());
             if used[piece] {
                 groups.count(DIPS, residual * residual, 1.0);
             }
             clusters.add(piece, residual, &by, groups.weight(DIPS));
         }
-        groups.end();
-        clusters
     }
 
-    /// Errors in sample at these parameters, over the pieces of time that are `used`. `None` without a turn.
     fn errors(&self, at: &DVector<f64>, used: &[bool]) -> Option<Errors> {
         let calibration = affine(&at.fixed_rows::<12>(0).into_owned());
         let per_axis = self.noise * calibration.matrix.norm_squared() / 3.0;
@@ -365,73 +471,6 @@ impl<'a> Problem<'a> {
         let squares = squares.filter_map(|p| Some(self.turn(*p, at)?.0.norm_squared() / 3.0));
         let squares: Vec<f64> = squares.collect();
         Errors::of(&squares, 2.0 * per_axis)
-    }
-
-    fn size_rms(&self, calibration: &Affine<f64>, used: &[bool]) -> f64 {
-        let own = self
-            .used
-            .iter()
-            .filter(|k| used[self.pieces.of(self.raw.t[**k])]);
-        let errors = own.map(|k| calibration.apply(&self.raw.x[*k]).norm() - self.size);
-        mimu_recording::statistics::root_mean_square(errors)
-    }
-
-    fn field(
-        &self,
-        at: &DVector<f64>,
-        solution: &Solution,
-        groups: &mut Groups,
-        used: &[bool],
-    ) -> Option<Field> {
-        let calibration = affine(&at.fixed_rows::<12>(0).into_owned());
-        let clusters = self.clusters(at, groups, used);
-        let half = self.pieces.count / 2;
-        let halves = [true, false].map(|first| clusters.moved(|g| used[g] && (g < half) == first));
-        let halves_rad = match halves {
-            [Some(a), Some(b)] => {
-                let apart = (a - b).fixed_rows::<12>(0).into_owned();
-                let each = self.used.iter();
-                let each = each.map(|k| (by_calibration(&self.raw.x[*k]) * apart).norm_squared());
-                (each.sum::<f64>() / self.used.len() as f64).sqrt() / self.size
-            }
-            _ => f64::INFINITY,
-        };
-        let mut errors = self.errors(at, used)?;
-        errors.held_out_rms *= solution.unseen(used);
-        let left = used.iter().filter(|used| !**used).count();
-        Some(Field {
-            worst_rad: self.worst(&calibration, &solution.covariance)?,
-            covariance: solution.covariance.clone(),
-            dof: solution.dof,
-            delay_s: at[DELAY],
-            dip_sine: at[DIP],
-            delay_undetermined: solution.by_weights[(DELAY, DELAY)].sqrt() / DELAY_S,
-            rests: self.rests.len(),
-            errors,
-            size_rms: self.size_rms(&calibration, used),
-            left_out: self.pieces.spans(used),
-            left_out_share: left as f64 / used.len() as f64,
-            halves_rad,
-            calibration,
-        })
-    }
-
-    /// Worst standard deviation of the field's direction, over fields along the axes and the corners of the body, rad.
-    fn worst(&self, calibration: &Affine<f64>, covariance: &DMatrix<f64>) -> Option<f64> {
-        let forward = calibration.matrix.try_inverse()?;
-        let own = covariance.fixed_view::<12, 12>(0, 0);
-        let mut worst = 0.0;
-        for code in 0..27 {
-            let to = Vector3::new(code % 3, code / 3 % 3, code / 9).map(|c| f64::from(c) - 1.0);
-            let Some(to) = to.try_normalize(0.5) else {
-                continue;
-            };
-            let by = by_calibration(&(forward * (to * self.size - calibration.offset)));
-            let across = Matrix3::identity() - to * to.transpose();
-            let error = across * by * own * by.transpose() * across;
-            worst = f64::max(worst, error.trace());
-        }
-        Some(worst.sqrt() / self.size)
     }
 }
 

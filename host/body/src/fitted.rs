@@ -3,8 +3,10 @@
 use mimu::judgement::Judgement;
 use mimu::triad::{Estimate, Part, Triad, affine, half_width_95, vector};
 use mimu_core::compensation::Affine;
-use mimu_recording::TriadName;
+use mimu_recording::{TriadKind, TriadName};
 use nalgebra::{Matrix3, Rotation3, SMatrix, SVector, Vector3};
+
+use crate::relation::{DELAY, Relation};
 
 /// A number, or why it is not known.
 pub type Known<T> = Result<T, String>;
@@ -44,6 +46,45 @@ pub struct FittedTriad {
     pub left_out: Vec<[f64; 2]>,
     /// Its judgement.
     pub judgement: Judgement,
+}
+
+impl FittedTriad {
+    /// Of its relation to the reference, whose errors make `by_reference` of its own; without a lever arm and a dip. `None` if two of its axes read the same.
+    pub(crate) fn of(
+        name: TriadName,
+        (relation, by_reference): (&Relation, Vec<Part>),
+        (unit, window_s): (&'static str, f64),
+        judgement: Judgement,
+    ) -> Option<Self> {
+        let parts = [vec![relation.part()], by_reference].concat();
+        let Placed {
+            triad,
+            rotation,
+            rotation_deg,
+        } = placed(&relation.calibration(), &parts)?;
+        let errors = &relation.errors;
+        Some(Self {
+            name,
+            reference: Some(TriadName::first(match name.kind {
+                TriadKind::Accel => TriadKind::Accel,
+                _ => TriadKind::Gyro,
+            })),
+            unit,
+            judgement,
+            triad,
+            rotation,
+            rotation_deg,
+            delay_ms: Ok(relation.estimate(DELAY, 1e3)),
+            lever_arm_mm: Err("it reads the same everywhere on a body".to_string()),
+            dip_deg: None,
+            rms: errors.rms,
+            held_out_rms: errors.held_out_rms,
+            noise_floor: errors.noise_floor,
+            window_s,
+            windows: errors.windows,
+            left_out: relation.left_out.clone(),
+        })
+    }
 }
 
 /// A calibration in the frame of the reference, taken apart into one in the triad's own frame and a rotation.

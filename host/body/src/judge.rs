@@ -4,7 +4,7 @@ use mimu::judgement::{Judgement, JudgementKind};
 use mimu::quantity::significant;
 
 use crate::errors::Errors;
-use crate::field::Field;
+use crate::field::{Field, LeftOut};
 
 /// Held-out errors up to this many times those of white noise are those of noise: windows also hold what a bias wanders by.
 const BY_NOISE: f64 = 1.5;
@@ -12,8 +12,10 @@ const BY_NOISE: f64 = 1.5;
 const MISFIT_SHARE: f64 = 0.1;
 /// The same of a field's direction, rad: a compass that is off by 5 degrees does not help a gyro.
 const MISFIT_RAD: f64 = 0.087;
-/// Share of the pieces of time that may be left out.
+/// Share of the time that may be left out.
 const MOST_LEFT_OUT: f64 = 0.25;
+/// Share of the time from which on a disturbance makes the rest suspect.
+const SUSPECT_LEFT_OUT: f64 = 0.1;
 /// Standard deviation of the direction of the field beyond which a calibration is not determined, rad: 3 degrees.
 const DETERMINED_RAD: f64 = 0.052;
 
@@ -74,20 +76,51 @@ fn misfit(reason: String) -> Judgement {
 
 /// Of a magnetometer; `size`: that of the field in the unit of its readings.
 pub(crate) fn field(field: &Field, size: f64) -> Judgement {
-    if field.left_out_share > MOST_LEFT_OUT {
+    let left_out = &field.left_out;
+    if left_out.share > MOST_LEFT_OUT {
         return misfit(format!(
             "the field differs from the rest in {:.0} % of the time: {MOVE_AWAY}",
-            100.0 * field.left_out_share
+            100.0 * left_out.share
         ));
     }
-    let again = field_again(&field.errors, field.size_rms, size);
+    let again = field_again(&field.relation.errors, field.size_rms, size);
     if field.halves_rad > MISFIT_RAD && again.needs_consent().is_none() {
         return misfit(format!(
             "the two halves of the recording give fields that differ by {} deg (rms): the field has changed, or each half turns too little; {MOVE_AWAY}",
             significant(field.halves_rad.to_degrees())
         ));
     }
-    again
+    if left_out.spans.is_empty() {
+        return again;
+    }
+    let disturbed = disturbed(left_out);
+    match again.kind {
+        JudgementKind::Good if left_out.share > SUSPECT_LEFT_OUT => Judgement::new(
+            JudgementKind::Suspect,
+            format!("{disturbed}, and less so in the rest: {MOVE_AWAY}"),
+        ),
+        kind => Judgement::new(
+            kind,
+            format!("{}; {disturbed}, which is left out", again.reason),
+        ),
+    }
+}
+
+/// What was left out, in words.
+fn disturbed(left_out: &LeftOut) -> String {
+    let by = [
+        (100.0 * left_out.size, "%"),
+        (left_out.angle_rad.to_degrees(), "deg"),
+    ];
+    let by = by.iter().filter(|(x, _)| x.is_finite());
+    let by: Vec<String> = by
+        .map(|(x, unit)| format!("{} {unit}", significant(*x)))
+        .collect();
+    format!(
+        "the field is disturbed by {} in {:.1} % of the time",
+        by.join(" and "),
+        100.0 * left_out.share
+    )
 }
 
 /// Of a magnetometer by its errors after turns, and by the rms error of the size of the field.

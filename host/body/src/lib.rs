@@ -4,6 +4,8 @@
 //! kind in the motion that all feel (`same_body.rs`), magnetometers by what the Earth's field keeps while the body turns (`field.rs`). Each gets its calibration, its
 //! rotation, its delay, an accelerometer its lever arm, each with its interval; what a recording leaves open is not given, with the reason.
 
+mod accel_delay;
+pub mod aligned;
 mod carrier;
 mod clustered;
 mod errors;
@@ -11,25 +13,29 @@ mod field;
 mod fitted;
 mod judge;
 mod pieces;
+mod relation;
 pub mod result;
 mod same_body;
 mod series;
+mod sessions;
 pub mod split;
 mod standing;
 pub mod trajectory;
 mod verify;
 
-use mimu::fit::Fit;
+use mimu::fit::{Fit, Options as FitOptions, fit};
 use mimu::judgement::Judgement;
 use mimu::prepared::Prepared;
 use mimu::quantity::{PerSensor, Sensor};
+use mimu::result::fit::FitResult;
 use mimu::signal::dwell::Dwell;
 use mimu::signal::stillness::DwellSearch;
-use mimu::triad::{Estimate, half_width_95};
+use mimu::triad::Estimate;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{RawUnit, Recording, TriadKind, TriadName};
 use nalgebra::Rotation3;
 
+pub use accel_delay::accel_delay_ms;
 pub use fitted::{FittedTriad, Known};
 pub use split::Split;
 pub use trajectory::ByTrajectory;
@@ -37,7 +43,7 @@ pub use verify::{TriadVerification, verify};
 
 use carrier::{Carrier, Unit, read};
 use field::Field;
-use same_body::Relation;
+use relation::{DELAY, Relation};
 use series::Series;
 
 /// What is given of a body.
@@ -121,6 +127,12 @@ impl Body {
         Ok(Some(body))
     }
 
+    /// The names of its further triads.
+    fn names(&self) -> impl Iterator<Item = TriadName> + '_ {
+        let refused = self.refused.iter().map(|(name, _)| *name);
+        self.triads.iter().map(|triad| triad.name).chain(refused)
+    }
+
     /// The worst of its judgements.
     pub fn judgement(&self) -> Judgement {
         let of = self.triads.iter().map(|triad| triad.judgement.clone());
@@ -130,63 +142,77 @@ impl Body {
     }
 }
 
-/// The errors of turns of all pairs of a body, each fitted for itself like the first (`unit`), in the frame of the first: the part that all share, and the part of each.
-/// `None` if there is only one pair, or if turns that two pairs share are too few.
-///
-/// # Errors
-/// The samples cannot be read.
-pub fn split_turns(
-    recording: &Recording,
-    unit: &Fit,
-    search: DwellSearch,
-) -> Result<Option<Split>> {
-    let triads = recording.triads();
-    let has = |number| {
+/// The pairs of a body: a gyro and an accelerometer with one number each.
+#[derive(Debug, Clone)]
+pub struct Pairs {
+    /// What their turns err by, split into the part that all share and the part of each.
+    pub split: Split,
+    /// The recording of the first pair without the part that all share; `None` for two pairs, or if noise explains what they share.
+    pub first: Option<Prepared>,
+}
+
+impl Pairs {
+    /// Each pair of `recording` fitted like the first (`unit`), their errors in its frame. `None` if there is only one, or if turns that two of them share are too few.
+    ///
+    /// # Errors
+    /// The samples cannot be read.
+    pub fn of(recording: &Recording, unit: &Fit, search: DwellSearch) -> Result<Option<Self>> {
+        let triads = recording.triads();
         let kinds = [TriadKind::Gyro, TriadKind::Accel];
-        kinds.iter().all(|kind| {
-            triads.contains(&TriadName {
+        let has = |number| {
+            let mut names = kinds.iter().map(|kind| TriadName {
                 kind: *kind,
                 number,
-            })
-        })
-    };
-    let numbers: Vec<u8> = (2..=TriadName::MOST).filter(|n| has(*n)).collect();
-    let body = match numbers.is_empty() {
-        true => None,
-        false => Body::of(recording, unit, &Options::default())?,
-    };
-    let Some(body) = body else {
-        return Ok(None);
-    };
-    let mut others = Vec::new();
-    for number in numbers {
-        let gyro = TriadName {
-            kind: TriadKind::Gyro,
-            number,
+            });
+            names.all(|name| triads.contains(&name))
         };
-        let placed = body.triads.iter().find(|triad| triad.name == gyro);
-        let Some(placed) = placed else {
-            continue;
+        let numbers: Vec<u8> = (2..=TriadName::MOST).filter(|n| has(*n)).collect();
+        let body = match numbers.is_empty() {
+            true => None,
+            false => Body::of(recording, unit, &Options::default())?,
         };
-        let prepared = Prepared::read(&recording.pair(number)?, search, |_| ())?;
-        // A pair that is not determined for itself says nothing of turns.
-        if let Ok(fit) = mimu::fit::fit(prepared, mimu::fit::Options::IN_SAMPLE) {
-            // The accelerometer of the pair gives the frame of its fit.
-            let own = TriadName {
-                kind: TriadKind::Accel,
-                number,
+        let Some(body) = body else {
+            return Ok(None);
+        };
+        let mut others = Vec::new();
+        for number in numbers {
+            // The accelerometer of a pair gives the frame of its fit.
+            let [gyro, accel] = kinds.map(|kind| {
+                let name = TriadName { kind, number };
+                body.triads.iter().find(|triad| triad.name == name)
+            });
+            let Some(gyro) = gyro else {
+                continue;
             };
-            let accel = body.triads.iter().find(|triad| triad.name == own);
-            let rotation = accel.map_or(placed.rotation, |accel| accel.rotation);
-            others.push((number, fit, rotation));
+            let prepared = Prepared::read(&recording.pair(number)?, search, |_| ())?;
+            // A pair that is not determined for itself says nothing of turns.
+            if let Ok(fit) = fit(prepared, FitOptions::IN_SAMPLE) {
+                others.push((number, fit, accel.unwrap_or(gyro).rotation));
+            }
         }
+        let first = [(1, unit, Rotation3::identity())].into_iter();
+        let others = others
+            .iter()
+            .map(|(number, fit, turn)| (*number, fit, *turn));
+        let all: Vec<_> = first.chain(others).collect();
+        let errors = split::turn_errors(&all);
+        let Some((errors, mut split)) = errors.and_then(|of| split::split(&of).map(|s| (of, s)))
+        else {
+            return Ok(None);
+        };
+        let mut first = None;
+        if split.exceeds_noise {
+            for (number, prepared) in split::own_turns(&all, &errors) {
+                if number == 1 {
+                    first = Some(prepared.clone());
+                }
+                if let Ok(fit) = fit(prepared, FitOptions::default()) {
+                    split.judged.insert(number, FitResult::of(&fit).judgement);
+                }
+            }
+        }
+        Ok(Some(Self { split, first }))
     }
-    let first = [(1, unit, Rotation3::identity())].into_iter();
-    let others = others
-        .iter()
-        .map(|(number, fit, turn)| (*number, fit, *turn));
-    let all: Vec<_> = first.chain(others).collect();
-    Ok(split::turn_errors(&all).as_ref().and_then(split::split))
 }
 
 /// The calibrations of the first two, and their readings.
@@ -231,62 +257,41 @@ impl Fitting<'_> {
                 "the first {sensor}, which it is compared with, is not calibrated"
             )));
         };
-        let relation = Relation::of(kind, raw, &reference).ok_or_else(|| {
+        let relation = same_body::relation(kind, raw, &reference).ok_or_else(|| {
             judge::undetermined(match sensor {
                 Sensor::Gyro => "its scale factors and angles are not determined: turn the body about all three axes",
                 Sensor::Accel => "its scale factors and angles are not determined: bring each axis up, down and in between",
             })
         })?;
-        let reference_parts = fitted::by_reference(&relation.calibration, unit);
-        let parts = [vec![relation.part()], reference_parts].concat();
-        let placed = fitted::placed(&relation.calibration, &parts)
-            .ok_or_else(|| judge::undetermined("two of its axes read the same"))?;
-        let [delay, arm] = relation.undetermined;
-        let at = |k: usize, scale: f64| estimate(&relation.covariance, relation.dof, k, scale);
-        let excess = relation.errors.held_out_rms / relation.errors.noise_floor;
-        let delay_ms = match sensor {
-            _ if delay >= DETERMINED => Err(
-                "its readings change too slowly to show a delay: turn and shake the body"
-                    .to_string(),
-            ),
-            // Measured on eight chips with one clock: 2 to 5 times the interval off, where those of their gyros were right.
-            Sensor::Accel if excess > FAITHFUL => Err(format!(
-                "it errs by {excess:.0} times its noise in motion, as where samples are too slow for it, and a delay would follow these errors"
-            )),
-            _ => Ok(at(12, 1e3)(relation.delay_s)),
-        };
-        let lever_arm_mm = match (kind, reference.motion) {
-            (TriadKind::Gyro, _) => Err("a gyro reads the same everywhere on a body".to_string()),
-            (_, None) => Err("without a gyro no rate is known".to_string()),
-            _ if arm < DETERMINED => Ok([0, 1, 2].map(|i| at(13 + i, 1e3)(relation.arm_m[i]))),
-            _ => Err(
-                "the body turns too slowly to show a lever arm: turn it faster, about two axes"
-                    .to_string(),
-            ),
-        };
-        Ok(FittedTriad {
+        let by_reference = fitted::by_reference(&relation.calibration(), unit);
+        let judgement = judge::same_body(
+            &relation.errors,
+            reference.signal(),
+            &format!("the first {sensor}"),
+            sensor.unit(),
+        );
+        let mut triad = FittedTriad::of(
             name,
-            reference: Some(TriadName::first(kind)),
-            unit: sensor.unit(),
-            judgement: judge::same_body(
-                &relation.errors,
-                reference.signal(),
-                &format!("the first {sensor}"),
-                sensor.unit(),
-            ),
-            triad: placed.triad,
-            rotation: placed.rotation,
-            rotation_deg: placed.rotation_deg,
-            delay_ms,
-            lever_arm_mm,
-            dip_deg: None,
-            rms: relation.errors.rms,
-            held_out_rms: relation.errors.held_out_rms,
-            noise_floor: relation.errors.noise_floor,
-            window_s: same_body::WINDOW_S,
-            windows: relation.errors.windows,
-            left_out: relation.left_out,
-        })
+            (&relation, by_reference),
+            (sensor.unit(), same_body::WINDOW_S),
+            judgement,
+        )
+        .ok_or_else(axes_alike)?;
+        let excess = relation.errors.held_out_rms / relation.errors.noise_floor;
+        if relation.undetermined(DELAY) >= DETERMINED {
+            triad.delay_ms = Err(
+                "its readings change too slowly to show a delay: turn and shake the body".into(),
+            );
+        } else if sensor == Sensor::Accel && excess > FAITHFUL {
+            // Measured on eight chips with one clock: 2 to 5 times the interval off, where those of their gyros were right.
+            triad.delay_ms = Err(format!(
+                "it errs by {excess:.0} times its noise in motion, as where samples are too slow for it, and a delay would follow these errors"
+            ));
+        }
+        if kind == TriadKind::Accel {
+            triad.lever_arm_mm = arm(&relation);
+        }
+        Ok(triad)
     }
 
     fn magnetometer(
@@ -303,66 +308,50 @@ impl Fitting<'_> {
         };
         let size = options.field_ut.unwrap_or(1.0);
         let raw = raw.without_repeats();
-        let field = Field::of(raw, motion, &self.unit.rests, size, self.unit.rate_bias).ok_or_else(|| {
+        let field = Field::of(&raw, motion, &self.unit.rests, size, self.unit.rate_bias).ok_or_else(|| {
             judge::undetermined("the field turns too little in its readings: bring each axis to point each way, and turn about all three")
         })?;
         judge::determines(&field)?;
-        let turned = fitted::turned_with(&field.calibration, gyro);
-        let parts = [vec![field.part()], turned].concat();
-        let placed = fitted::placed(&field.calibration, &parts)
-            .ok_or_else(|| judge::undetermined("two of its axes read the same"))?;
-        let at = |k: usize, scale: f64| estimate(&field.covariance, field.dof, k, scale);
-        let sine = field.dip_sine.clamp(-0.999_999, 0.999_999);
-        let by_sine = (1.0 - sine * sine).sqrt().recip().to_degrees();
-        let dip = match field.rests {
-            0 => Err("no rest shows where up is".to_string()),
-            _ => Ok(Estimate {
-                value: sine.asin().to_degrees(),
-                ..at(13, by_sine)(sine)
-            }),
+        let relation = &field.relation;
+        let turned = fitted::turned_with(&relation.calibration(), gyro);
+        let unit = match options.field_ut {
+            Some(_) => "uT",
+            None => "field",
         };
-        Ok(FittedTriad {
+        let mut triad = FittedTriad::of(
             name,
-            reference: Some(TriadName::first(TriadKind::Gyro)),
-            unit: if options.field_ut.is_some() {
-                "uT"
-            } else {
-                "field"
-            },
-            judgement: judge::field(&field, size),
-            triad: placed.triad,
-            rotation: placed.rotation,
-            rotation_deg: placed.rotation_deg,
-            delay_ms: match field.delay_undetermined < DETERMINED {
-                true => Ok(at(12, 1e3)(field.delay_s)),
-                false => Err("the body turns too slowly to show a delay".to_string()),
-            },
-            lever_arm_mm: Err("a magnetometer reads the same everywhere on a body".to_string()),
-            dip_deg: Some(dip),
-            rms: field.errors.rms,
-            held_out_rms: field.errors.held_out_rms,
-            noise_floor: field.errors.noise_floor,
-            window_s: field::TURN_S,
-            windows: field.errors.windows,
-            left_out: field.left_out,
-        })
+            (relation, turned),
+            (unit, field::TURN_S),
+            judge::field(&field, size),
+        )
+        .ok_or_else(axes_alike)?;
+        if relation.undetermined(DELAY) >= DETERMINED {
+            triad.delay_ms = Err("the body turns too slowly to show a delay".into());
+        }
+        triad.dip_deg = Some(field.dip_deg());
+        triad.left_out = field.left_out.spans;
+        Ok(triad)
+    }
+}
+
+fn axes_alike() -> Judgement {
+    judge::undetermined("two of its axes read the same")
+}
+
+/// The lever arm of an accelerometer.
+fn arm(relation: &Relation) -> Known<[Estimate; 3]> {
+    let arm = [0, 1, 2].map(|i| same_body::ARM + i);
+    if relation.at.len() <= arm[2] {
+        return Err("without a gyro no rate is known".into());
+    }
+    let open = arm.map(|k| relation.undetermined(k));
+    match open.into_iter().fold(0.0, f64::max) < DETERMINED {
+        true => Ok(arm.map(|k| relation.estimate(k, 1e3))),
+        false => Err(
+            "the body turns too slowly to show a lever arm: turn it faster, about two axes".into(),
+        ),
     }
 }
 
 /// Fewest readings of a triad.
 const FEWEST: usize = 100;
-
-/// A parameter with its interval, in units of `scale`, given its value.
-fn estimate(
-    covariance: &nalgebra::DMatrix<f64>,
-    dof: f64,
-    k: usize,
-    scale: f64,
-) -> impl Fn(f64) -> Estimate {
-    let variance = covariance[(k, k)].max(0.0) * scale * scale;
-    move |value| Estimate {
-        value: value * scale,
-        sigma: variance.sqrt(),
-        interval: half_width_95([(variance, dof)].into_iter()),
-    }
-}

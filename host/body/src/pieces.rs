@@ -43,16 +43,23 @@ impl Pieces {
 
     /// Times of the pieces that are not used, neighbours together, s.
     pub fn spans(&self, used: &[bool]) -> Vec<[f64; 2]> {
-        let mut spans: Vec<[f64; 2]> = Vec::new();
-        for (k, _) in used.iter().enumerate().filter(|(_, used)| !**used) {
-            let [from, to] = [k, k + 1].map(|k| self.from + self.length * k as f64);
-            match spans.last_mut() {
-                Some(last) if last[1] >= from - 1e-9 * self.length => last[1] = to,
-                _ => spans.push([from, to]),
-            }
-        }
-        spans
+        let left = used.iter().enumerate().filter(|(_, used)| !**used);
+        let spans = left.map(|(k, _)| [k, k + 1].map(|k| self.from + self.length * k as f64));
+        joined(spans.collect())
     }
+}
+
+/// Spans of time in their order, those that touch or overlap as one.
+pub(crate) fn joined(mut spans: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
+    spans.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    let mut all: Vec<[f64; 2]> = Vec::new();
+    for [from, to] in spans {
+        match all.last_mut() {
+            Some(last) if last[1] >= from - 1e-9 => last[1] = last[1].max(to),
+            _ => all.push([from, to]),
+        }
+    }
+    all
 }
 
 /// Scatter of groups of residuals, which weighs them.

@@ -4,15 +4,15 @@
 //! the first accelerometer and the arm r to the second. Both are compared in integrals over windows, so that nothing is differentiated: of ω' there remains
 //! the difference of two rates, and of a delay τ the difference of two readings. Both are linear in C, o and r; τ is found by steps.
 
-use mimu::triad::{Part, affine, vector};
-use mimu_core::compensation::Affine;
+use mimu::triad::affine;
 use mimu_recording::TriadKind;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use crate::carrier::Reference;
-use crate::clustered::{Clusters, Solution};
+use crate::clustered::Clusters;
 use crate::errors::Errors;
 use crate::pieces::{Groups, Pieces};
+use crate::relation::{DELAY, Equations, Relation};
 use crate::series::Series;
 use crate::standing::Standing;
 
@@ -25,32 +25,8 @@ const MOVING: f64 = 0.1;
 /// What is known of a delay and of an arm beforehand, standard deviations, s and m.
 const DELAY_S: f64 = 0.05;
 const ARM_M: f64 = 0.2;
-/// Most steps, and the change of the delay at which they end, s.
-const STEPS: usize = 20;
-const SETTLED_S: f64 = 1e-7;
-/// Longest step of the delay, s: beyond a fifth of a second's motion the difference of two readings says little.
-const LONGEST_STEP_S: f64 = 0.03;
-
-/// Parameters: C by rows, o, delay (s), and the arm (m) of an accelerometer.
-const DELAY: usize = 12;
-const ARM: usize = 13;
-
-/// The relation of a further triad to the first of its kind.
-pub(crate) struct Relation {
-    /// C and o, raw to SI, in the frame of the reference.
-    pub calibration: Affine<f64>,
-    /// Covariance of all parameters by the jackknife, and its degrees of freedom.
-    pub covariance: DMatrix<f64>,
-    pub dof: f64,
-    /// Delay, s, and arm, m.
-    pub delay_s: f64,
-    pub arm_m: Vector3<f64>,
-    /// Share of what was known beforehand that delay and arm (its worst direction) still have as their standard deviation.
-    pub undetermined: [f64; 2],
-    /// Errors of the mean reading of a window, SI.
-    pub errors: Errors,
-    pub left_out: Vec<[f64; 2]>,
-}
+/// The first parameter of the arm (m) of an accelerometer.
+pub(crate) const ARM: usize = 13;
 
 /// A window: samples `from..=to` of the further triad.
 #[derive(Clone, Copy)]
@@ -78,53 +54,25 @@ struct Integral {
     by_delay: Vector3<f64>,
 }
 
-impl Relation {
-    /// Of a triad's raw readings. `None` if the motion does not determine it.
-    pub fn of(kind: TriadKind, raw: &Series, reference: &Reference) -> Option<Self> {
-        let problem = Problem::new(kind, raw, reference)?;
-        let mut at = problem.start()?;
-        let mut groups = Groups::default();
-        let mut used = vec![true; problem.pieces.count];
-        let mut solution = None;
-        for round in 0..4 {
-            solution = Some(problem.settle(&mut at, &mut groups, &used)?);
-            let held = &solution.as_ref()?.held_out;
-            let next = problem.pieces.kept(held);
-            if round == 3 || next == used {
-                break;
-            }
-            used = next;
-        }
-        problem.relation(&at, &solution?, &used)
-    }
+/// The relation of a triad with these raw readings. `None` if the motion does not determine it.
+pub(crate) fn relation(kind: TriadKind, raw: &Series, reference: &Reference) -> Option<Relation> {
+    let problem = Problem::new(kind, raw, reference)?;
+    Relation::of(&problem, problem.start()?)
+}
 
-    /// Errors of a triad that stands so. `None` if nothing of it can be compared.
-    pub fn errors(
-        kind: TriadKind,
-        raw: &Series,
-        reference: &Reference,
-        standing: &Standing,
-    ) -> Option<Errors> {
-        let problem = Problem::new(kind, raw, reference)?;
-        let mut at = DVector::zeros(problem.parameters);
-        let Affine { matrix, offset } = standing.calibration;
-        at.fixed_rows_mut::<12>(0)
-            .copy_from(&vector(&matrix, &offset));
-        at[DELAY] = standing.delay_s;
-        if problem.parameters > ARM {
-            at.fixed_rows_mut::<3>(ARM).copy_from(&standing.arm_m);
-        }
-        problem.errors(&at, &vec![true; problem.pieces.count])
+/// Errors of a triad that stands so. `None` if nothing of it can be compared.
+pub(crate) fn errors(
+    kind: TriadKind,
+    raw: &Series,
+    reference: &Reference,
+    standing: &Standing,
+) -> Option<Errors> {
+    let problem = Problem::new(kind, raw, reference)?;
+    let mut at = standing.parameters(problem.parameters);
+    if problem.parameters > ARM {
+        at.fixed_rows_mut::<3>(ARM).copy_from(&standing.arm_m);
     }
-
-    /// The part of the covariance of C and o.
-    pub fn part(&self) -> Part {
-        Part {
-            covariance: self.covariance.fixed_view::<12, 12>(0, 0).into_owned(),
-            dof: self.dof,
-            known: 0.0,
-        }
-    }
+    problem.errors(&at, &vec![true; problem.pieces.count])
 }
 
 impl<'a> Problem<'a> {
@@ -247,41 +195,29 @@ impl<'a> Problem<'a> {
         }
         Some((residual / time, by))
     }
+}
 
-    /// Steps until delay and weights stand still; returns the last solution, whose step is then nearly zero.
-    fn settle(
-        &self,
-        at: &mut DVector<f64>,
-        groups: &mut Groups,
-        used: &[bool],
-    ) -> Option<Solution> {
-        let mut last = None;
-        for _ in 0..STEPS {
-            let solution = self.clusters(at, groups, used).solve(used)?;
-            let mut step = solution.step.clone();
-            let longest = step[DELAY].abs() / LONGEST_STEP_S;
-            if longest > 1.0 {
-                step /= longest;
-            }
-            *at += &step;
-            let is_settled = step[DELAY].abs() < SETTLED_S;
-            last = Some(solution);
-            if is_settled && groups.are_settled() {
-                break;
-            }
-        }
-        last
-    }
-
-    fn clusters(&self, at: &DVector<f64>, groups: &mut Groups, used: &[bool]) -> Clusters {
+impl Equations for Problem<'_> {
+    fn known(&self) -> DVector<f64> {
         let mut known = DVector::repeat(self.parameters, f64::INFINITY);
         known[DELAY] = DELAY_S;
         for k in ARM..self.parameters {
             known[k] = ARM_M;
         }
-        let zero = DVector::zeros(self.parameters);
-        let mut clusters = Clusters::new(self.pieces.count, at, &zero, &known);
-        groups.begin();
+        known
+    }
+
+    fn pieces(&self) -> &Pieces {
+        &self.pieces
+    }
+
+    fn add_to(
+        &self,
+        clusters: &mut Clusters,
+        at: &DVector<f64>,
+        groups: &mut Groups,
+        used: &[bool],
+    ) {
         for window in &self.windows {
             let Some((residual, by)) = self.residual(window, at) else {
                 continue;
@@ -296,11 +232,8 @@ impl<'a> Problem<'a> {
                 clusters.add(window.piece, residual[axis], &row, weight);
             }
         }
-        groups.end();
-        clusters
     }
 
-    /// Errors in sample at these parameters, over the pieces of time that are `used`. `None` without a window.
     fn errors(&self, at: &DVector<f64>, used: &[bool]) -> Option<Errors> {
         let calibration = affine(&at.fixed_rows::<12>(0).into_owned());
         let own = self.raw.noise_of_means(self.samples) * calibration.matrix.norm_squared() / 3.0;
@@ -309,26 +242,5 @@ impl<'a> Problem<'a> {
         let squares = windows.filter_map(|w| Some(self.residual(w, at)?.0.norm_squared() / 3.0));
         let squares: Vec<f64> = squares.collect();
         Errors::of(&squares, noise)
-    }
-
-    fn relation(&self, at: &DVector<f64>, solution: &Solution, used: &[bool]) -> Option<Relation> {
-        let calibration = affine(&at.fixed_rows::<12>(0).into_owned());
-        let mut errors = self.errors(at, used)?;
-        errors.held_out_rms *= solution.unseen(used);
-        let share = |k: usize, prior: f64| solution.by_weights[(k, k)].sqrt() / prior;
-        let arm = (ARM..self.parameters).map(|k| share(k, ARM_M));
-        Some(Relation {
-            calibration,
-            covariance: solution.covariance.clone(),
-            dof: solution.dof,
-            delay_s: at[DELAY],
-            arm_m: match self.parameters > ARM {
-                true => at.fixed_rows::<3>(ARM).into_owned(),
-                false => Vector3::zeros(),
-            },
-            undetermined: [share(DELAY, DELAY_S), arm.fold(0.0, f64::max)],
-            errors,
-            left_out: self.pieces.spans(used),
-        })
     }
 }

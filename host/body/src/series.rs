@@ -70,10 +70,22 @@ impl Series {
         } else {
             0.5 * self.period
         };
-        let all = new.iter().map(|k| (self.t[*k] - age, self.x[*k])).collect();
-        let before = [0].iter().chain(&new).zip(&new);
+        self.only(&new, age)
+    }
+
+    /// Without the samples in these spans of time, s.
+    pub fn without(&self, spans: &[[f64; 2]]) -> Self {
+        let is_in = |k: &usize| spans.iter().any(|[a, b]| (*a..*b).contains(&self.t[*k]));
+        let kept: Vec<usize> = (0..self.len()).filter(|k| !is_in(k)).collect();
+        self.only(&kept, 0.0)
+    }
+
+    /// Of the samples with these numbers only, so much earlier.
+    fn only(&self, kept: &[usize], age: f64) -> Self {
+        let all = kept.iter().map(|k| (self.t[*k] - age, self.x[*k]));
+        let before = kept.iter().take(1).chain(kept).zip(kept);
         let broken: Vec<bool> = before.map(|(a, b)| self.is_broken(*a, *b)).collect();
-        Self::of(all, &broken)
+        Self::of(all.collect(), &broken)
     }
 
     /// Each reading through `map`.
@@ -84,6 +96,12 @@ impl Series {
             period: self.period,
             broken: self.broken.clone(),
         }
+    }
+
+    /// Numbers of the samples in a span of time, s.
+    pub fn within(&self, [from, to]: [f64; 2]) -> std::ops::Range<usize> {
+        let before = |end: f64| self.t.partition_point(|t| *t < end);
+        before(from)..before(to)
     }
 
     /// Number of samples.

@@ -11,16 +11,19 @@
 //! and so are all figures here: those of turns that no fit has seen are larger.
 
 mod of_fits;
+mod own;
 
 use std::collections::BTreeMap;
 
 use mimu::effects::temperature::rank_correlation;
+use mimu::judgement::Judgement;
 use mimu::unseen::FALSE_ALARM;
 use nalgebra::{DMatrix, Matrix3, Vector3};
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, StudentsT};
 
 pub use of_fits::turn_errors;
+pub use own::own_turns;
 
 /// Fewest turns that two pairs have to share.
 const FEWEST: usize = 6;
@@ -48,6 +51,8 @@ pub struct TurnErrors {
     pub conditions: Vec<[f64; 4]>,
     /// Mean square of each turn's error by what is known to be common, rad²: the Earth's rate about an unknown heading.
     pub shared: Vec<f64>,
+    /// For each pair the dwell of its own that each turn ends in.
+    pub places: Vec<Vec<Option<usize>>>,
 }
 
 /// A part of the errors.
@@ -101,6 +106,8 @@ pub struct Split {
     pub exceeds_noise: bool,
     /// What the common part correlates with; empty if it does not exceed the noise.
     pub correlations: Vec<Correlation>,
+    /// How a fit of each pair is judged by its own part, without the common one; empty for two pairs.
+    pub judged: BTreeMap<u8, Judgement>,
 }
 
 /// Products of the errors of each two pairs, over the turns that both have.
@@ -216,6 +223,7 @@ pub fn split(of: &TurnErrors) -> Option<Split> {
             .filter(|_| p < FALSE_ALARM)
             .filter_map(|number| of.correlation(&means, number))
             .collect(),
+        judged: BTreeMap::new(),
     })
 }
 

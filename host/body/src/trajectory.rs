@@ -10,7 +10,7 @@ use mimu::calibration::of_fit::{FIGURE_DIGITS, triad_table};
 use mimu::calibration::{Calibration, Judged, TriadTable};
 use mimu::in_use::Trajectory;
 use mimu::quantity::{PerSensor, Sensor, rounded};
-use mimu::triad::{Covariance, Estimate, Part, Triad, vector};
+use mimu::triad::{Covariance, Estimate, Part, Triad, half_width_95, vector};
 use mimu_core::compensation::Affine;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{RawUnit, Recording};
@@ -138,7 +138,12 @@ impl Found {
     }
 
     fn estimate(&self, k: usize, scale: f64) -> Estimate {
-        crate::estimate(&self.solution.covariance, self.solution.dof, k, scale)(self.at[k])
+        let variance = self.solution.covariance[(k, k)].max(0.0) * scale * scale;
+        Estimate {
+            value: self.at[k] * scale,
+            sigma: variance.sqrt(),
+            interval: half_width_95([(variance, self.solution.dof)].into_iter()),
+        }
     }
 }
 

@@ -13,9 +13,8 @@ use serde::Serialize;
 
 use crate::carrier::{Carrier, read};
 use crate::field::Field;
-use crate::judge;
-use crate::same_body::Relation;
 use crate::standing::Standing;
+use crate::{judge, same_body};
 
 /// Errors of a further triad.
 #[derive(Debug, Clone, Serialize)]
@@ -97,7 +96,7 @@ fn one(
             let Some(reference) = carrier.reference(sensor) else {
                 return Ok(None);
             };
-            let Some(errors) = Relation::errors(kind, &raw, &reference, &standing) else {
+            let Some(errors) = same_body::errors(kind, &raw, &reference, &standing) else {
                 return Ok(None);
             };
             let judgement = judge::same_body(

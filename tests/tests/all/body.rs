@@ -44,6 +44,36 @@ fn a_magnetometer_in_a_strongly_disturbed_field_is_not_good() {
     assert_eq!(good(Disturbance::Phone(40.0), 4), 0);
 }
 
+/// Magnetometers of bodies that a phone of this size is put beside for so long: those whose readings with the phone were left out.
+fn passed(size_ut: f64, stay_s: f64, bodies: u64) -> Vec<Vec<Found>> {
+    let mag = TriadName::first(TriadKind::Mag);
+    let phone = Disturbance::Passing(size_ut, stay_s);
+    let bodies = cases(phone, Bandwidth::Unlimited, bodies).into_iter();
+    let mags = bodies.map(|all| all.into_iter().filter(|f| f.name == mag).collect());
+    mags.collect()
+}
+
+#[test]
+fn a_phone_that_comes_and_goes_is_left_out_and_the_judgement_says_so() {
+    for found in passed(20.0, 5.0, 4).iter().flatten() {
+        assert!(!found.parameters.is_empty(), "{found:?}");
+        let is_named = |[from, to]: &[f64; 2]| *from < 85.0 && *to > 80.0;
+        assert!(found.left_out.iter().any(is_named), "{found:?}");
+        assert!(found.judgement.reason.contains("disturbed"), "{found:?}");
+    }
+}
+
+#[test]
+#[ignore = "nightly: more bodies"]
+fn intervals_hold_the_truth_though_a_phone_comes_and_goes() {
+    for stay_s in [3.0, 6.0, 12.0, 18.0, 30.0] {
+        for size_ut in [3.0, 10.0, 30.0] {
+            let bodies = passed(size_ut, stay_s, 40);
+            println!("{size_ut} µT for {stay_s} s\n{}", table(&bodies));
+        }
+    }
+}
+
 #[test]
 #[ignore = "nightly: more bodies"]
 fn intervals_of_many_further_triads_hold_the_truth() {

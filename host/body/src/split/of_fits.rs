@@ -26,6 +26,7 @@ pub fn turn_errors(fits: &[(u8, &Fit, Rotation3<f64>)]) -> Option<TurnErrors> {
             noise: vec![Matrix3::zeros(); own.len()],
             left: left(fit, turns.len())?,
         };
+        let mut places = vec![None; own.len()];
         for turn in &turns {
             let [from, to] = ends(fit, turn);
             let same = |own: &[[f64; 2]; 2]| overlap(&own[0], &from) && overlap(&own[1], &to);
@@ -35,13 +36,16 @@ pub fn turn_errors(fits: &[(u8, &Fit, Rotation3<f64>)]) -> Option<TurnErrors> {
             let up = rotation * turn.after.normalize();
             let across = Matrix3::identity() - up * up.transpose();
             of.errors[j] = rotation * TurnError::at(turn, &gyro).vector();
+            places[j] = Some(turn.to);
             of.noise[j] = across * (turn.variance(square) - turn.earth_variance);
         }
-        Some(of)
+        Some((of, places))
     });
+    let (pairs, places) = pairs.collect::<Option<Vec<_>>>()?.into_iter().unzip();
     let each = turns.iter().zip(&own);
     Some(TurnErrors {
-        pairs: pairs.collect::<Option<_>>()?,
+        pairs,
+        places,
         conditions: each
             .map(|(turn, ends)| conditions(turn, &gyro, ends[1][0]))
             .collect(),

@@ -1,6 +1,6 @@
 use std::f64::consts::TAU;
 
-use mimu::fit::{Options, fit};
+use mimu::fit::{Fit, Options, fit};
 use mimu::prepared::Prepared;
 use mimu::{DwellSearch, Manifest, RawUnit, Reference, Samples};
 use nalgebra::{DVector, Rotation3};
@@ -98,6 +98,7 @@ impl Simulated {
         TurnErrors {
             pairs: pairs.collect(),
             shared: vec![self.shared.powi(2); TURNS],
+            places: Vec::new(),
             conditions: conditions.clone(),
         }
     }
@@ -295,18 +296,52 @@ fn by_hand(mounted: &Matrix3<f64>, seed: u64) -> Samples {
     samples
 }
 
+/// The fit of a pair that is mounted so, in one motion that is sampled too slowly.
+fn fitted(mounted: &Matrix3<f64>) -> Fit {
+    let manifest = Manifest::new("unit", 100.0, 9.8, RawUnit::Si, Reference::Gravity);
+    let prepared = Prepared::of(manifest, &by_hand(mounted, 5), DwellSearch::default());
+    fit(prepared.expect("it has dwells"), Options::IN_SAMPLE).expect("it can be fitted")
+}
+
+#[test]
+fn what_all_pairs_err_by_is_taken_out_of_the_turns_of_each_in_its_own_frame() {
+    let mounted = [
+        Matrix3::identity(),
+        Matrix3::new(0.0, 1.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, 1.0),
+        Matrix3::new(0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0),
+    ];
+    let mut fits = mounted.each_ref().map(fitted);
+    let errors = |fits: &[Fit; 3], take: bool| {
+        let pairs = [0, 1, 2].map(|i| {
+            let into_first = Rotation3::from_matrix_unchecked(mounted[i].transpose());
+            (i as u8 + 1, &fits[i], into_first)
+        });
+        let errors = turn_errors(&pairs).expect("all turn");
+        let own = if take {
+            own_turns(&pairs, &errors)
+        } else {
+            Vec::new()
+        };
+        (errors, own)
+    };
+    let (before, own) = errors(&fits, true);
+    for (fit, (_, prepared)) in fits.iter_mut().zip(own) {
+        fit.prepared = prepared;
+    }
+    let (after, _) = errors(&fits, false);
+    for (before, after) in before.pairs.iter().zip(&after.pairs) {
+        for (before, after) in before.errors.iter().zip(&after.errors) {
+            assert!(
+                after.norm() < 0.05 * before.norm() + 1e-6,
+                "{before} {after}"
+            );
+        }
+    }
+}
+
 #[test]
 fn one_motion_read_in_two_frames_errs_alike() {
-    let manifest = |name: &str| Manifest::new(name, 100.0, 9.8, RawUnit::Si, Reference::Gravity);
     let mounted = Matrix3::new(0.0, 1.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, 1.0);
-    let fitted = |mounted: &Matrix3<f64>| {
-        let prepared = Prepared::of(
-            manifest("unit"),
-            &by_hand(mounted, 5),
-            DwellSearch::default(),
-        );
-        fit(prepared.expect("it has dwells"), Options::IN_SAMPLE).expect("it can be fitted")
-    };
     let (first, second) = (fitted(&Matrix3::identity()), fitted(&mounted));
     let into_first = Rotation3::from_matrix_unchecked(mounted.transpose());
     let errors = turn_errors(&[(1, &first, Rotation3::identity()), (2, &second, into_first)]);

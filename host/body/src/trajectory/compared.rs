@@ -465,9 +465,10 @@ impl<'a> Compared<'a> {
         }
         let skipped = self.parameters() - map.ncols();
         let own = |of: &DVector<f64>| of.rows(skipped, map.ncols()).into_owned();
-        let mut value = DVector::zeros(self.parameters());
-        value[DELAY] = at[DELAY];
-        let mut clusters = Clusters::new(clusters, &own(at), &own(&value), &own(&known));
+        // What is known of the delay is known around what the search found.
+        let mut beyond = at.clone();
+        beyond[DELAY] = 0.0;
+        let mut clusters = Clusters::new(clusters, &own(&beyond), &own(&known));
         groups.begin();
         for (window, cluster, counts) in windows {
             let Some(Reckoned { residual, by }) = self.reckoned(window, at) else {

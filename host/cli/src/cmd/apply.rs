@@ -3,7 +3,8 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use mimu::calibration::apply::{Applied, Compensated, apply};
+use mimu::calibration::apply::{Applied, Compensated};
+use mimu_body::aligned::{Aligned, MeanUnit, apply};
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{CopiedTable, MANIFEST_FILE, Recording, ReplacedTriad, SampleFormat};
 
@@ -12,7 +13,7 @@ use crate::hint::OF_A_LOG;
 use crate::opening::{Opened, open as open_calibration};
 use crate::output::{check_outputs, print, progress};
 use crate::reading::{LogArgs, imported_to, named, open};
-use crate::report;
+use crate::report::{self, Joined};
 
 #[derive(Args)]
 pub(crate) struct ApplyArgs {
@@ -27,7 +28,10 @@ pub(crate) struct ApplyArgs {
     /// Replace an existing recording
     #[arg(long)]
     replace: bool,
-    /// Directory of the compensated recording, in which further triads are rotated into the frame of their reference and keep their times; for a log of text also a CSV file: a copy of its rows with compensated readings
+    /// Write the mean unit of an array in the place of its first gyro and accelerometer: each in their frame and at their place
+    #[arg(long)]
+    mean: bool,
+    /// Directory of the compensated recording, in which further triads are rotated into the frame of their reference and moved by their delays; for a log of text also a CSV file: a copy of its rows with compensated readings
     #[arg(short, value_name = "DIR|FILE.csv")]
     output: PathBuf,
     #[command(flatten)]
@@ -42,15 +46,25 @@ pub(crate) fn run(args: &ApplyArgs) -> Result<()> {
         .output
         .extension()
         .is_some_and(|ending| ending.eq_ignore_ascii_case("csv"));
-    let applied = match args.recording.is_file() && is_table {
+    let (applied, mean) = match args.recording.is_file() && is_table {
         true => copied(args, calibration)?,
         false => written(args, calibration)?,
     };
-    print(&args.json, &report::apply_text(&applied), &applied, None)
+    let mut text = report::apply_text(&applied);
+    text.extend(mean.as_ref().map(report::mean_text));
+    let mean = mean.map(|mean| serde_json::json!({ "mean": mean }));
+    print(
+        &args.json,
+        &text,
+        &Joined::of(&applied, mean.as_ref()),
+        None,
+    )
 }
 
+type Made = (Applied, Option<MeanUnit>);
+
 /// Writes a recording.
-fn written(args: &ApplyArgs, calibration: Opened) -> Result<Applied> {
+fn written(args: &ApplyArgs, calibration: Opened) -> Result<Made> {
     let recording = open(&args.recording, &args.log)?;
     let calibration = calibration.of_readings(recording.manifest.raw_unit)?;
     let manifest = args.recording.join(MANIFEST_FILE);
@@ -65,9 +79,8 @@ fn written(args: &ApplyArgs, calibration: Opened) -> Result<Applied> {
     let done = apply(
         &recording,
         &calibration,
-        &args.output,
-        args.format,
-        args.replace,
+        (&args.output, args.format, args.replace),
+        args.mean,
         |share| bar.reach(share),
     );
     bar.finish();
@@ -75,7 +88,7 @@ fn written(args: &ApplyArgs, calibration: Opened) -> Result<Applied> {
 }
 
 /// Writes a copy of a text file, with its readings compensated: stamps and all other columns stay as they are.
-fn copied(args: &ApplyArgs, calibration: Opened) -> Result<Applied> {
+fn copied(args: &ApplyArgs, calibration: Opened) -> Result<Made> {
     if args.output.exists() && !args.replace {
         let error = Error::new(
             args.output.display(),
@@ -90,6 +103,7 @@ fn copied(args: &ApplyArgs, calibration: Opened) -> Result<Applied> {
     let recording = named(Recording::open(&folder)?, &args.recording);
     let calibration = calibration.of_readings(recording.manifest.raw_unit)?;
     let bar = progress("compensating");
+    let mut aligned = Aligned::of(&recording, &calibration, args.mean)?;
     let mut compensated =
         Compensated::new(&recording, &calibration, |share| bar.reach(0.5 * share))?;
     let replaced = compensated.units().map(|(triad, unit)| ReplacedTriad {
@@ -101,6 +115,7 @@ fn copied(args: &ApplyArgs, calibration: Opened) -> Result<Applied> {
     compensated.for_each(
         |share| bar.reach(0.5 + 0.5 * share),
         |_, clean| {
+            aligned.place(clean);
             rows += clean.len() as u64;
             (0..clean.len()).try_for_each(|k| {
                 copy.row(|column| {
@@ -112,5 +127,5 @@ fn copied(args: &ApplyArgs, calibration: Opened) -> Result<Applied> {
     )?;
     bar.finish();
     copy.write(&args.output)?;
-    Ok(compensated.into_applied(&args.output, rows))
+    Ok(aligned.finish(compensated.into_applied(&args.output, rows)))
 }

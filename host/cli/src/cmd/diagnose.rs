@@ -8,13 +8,19 @@ use crate::report::{self, Made};
 use clap::Args;
 use mimu::diagnose::Recordings;
 use mimu::diagnosed::{Diagnosed, diagnosed};
+use mimu::fit::{Options as FitOptions, fit};
 use mimu::noise::noise_file::NoiseFile;
 use mimu::plan::next_experiment;
 use mimu::prepared::Prepared;
+use mimu::quantity::Sensor;
 use mimu::recording_problem::OfRecording;
 use mimu::signal::stillness::DwellSearch;
-use mimu_body::{Body, Options, split_turns};
+use mimu::triad::Estimate;
+use mimu_body::result::EstimateResult;
+use mimu_body::{Body, Options, Pairs, Split, accel_delay_ms};
+use mimu_recording::Recording;
 use mimu_recording::error::Result;
+use serde_json::{Value, json};
 
 use crate::arguments::{
     JsonArgs, KeepArgs, NoiseArgs, StillArgs, StrictArgs, VerboseArgs, WholeTurnArgs, WritingArgs,
@@ -23,7 +29,7 @@ use crate::arguments::{
 use crate::hint::OF_A_LOG;
 use crate::output::{Results, now, progress};
 use crate::reading::{LogArgs, read_samples};
-use crate::report::refused;
+use crate::report::{Joined, refused};
 use crate::status::Status;
 
 /// Arguments of `mimu diagnose`.
@@ -120,6 +126,37 @@ fn write_plan(args: &DiagnoseArgs, done: &Diagnosed, out: &mut Results) -> Resul
     Ok(())
 }
 
+/// Whether a delay is there. At twice its interval one in ten thousand units without a delay would have one.
+fn is_found(delay: &Estimate) -> bool {
+    delay.value.abs() > 2.0 * delay.interval
+}
+
+/// What a body and a delay add to the result as JSON.
+fn further(split: Option<Split>, delay: Option<Estimate>) -> Option<Value> {
+    let mut more = serde_json::Map::new();
+    more.extend(split.map(|split| ("body".to_owned(), json!(split))));
+    let delay = delay.map(EstimateResult::from);
+    more.extend(delay.map(|delay| ("accel_delay_ms".to_owned(), json!(delay))));
+    (!more.is_empty()).then_some(Value::Object(more))
+}
+
+/// The pairs of the recording with these `samples`, if it has several. With a given calibration no pair is fitted.
+fn pairs(
+    args: &DiagnoseArgs,
+    samples: Option<&Recording>,
+    first: &Prepared,
+) -> Result<Option<Pairs>> {
+    let several = samples.filter(|of| of.triads().len() > Sensor::BOTH.len());
+    let Some(samples) = several.filter(|_| args.calibration.is_none()) else {
+        return Ok(None);
+    };
+    // A first pair that is not determined is refused by the diagnosis.
+    match fit(first.clone(), FitOptions::IN_SAMPLE) {
+        Ok(fit) => Pairs::of(samples, &fit, args.still.search()),
+        Err(_) => Ok(None),
+    }
+}
+
 pub fn run(args: &DiagnoseArgs, command_line: &str) -> Result<Status> {
     let outputs = [
         args.output.as_deref(),
@@ -143,8 +180,14 @@ pub fn run(args: &DiagnoseArgs, command_line: &str) -> Result<Status> {
     let all: Result<Vec<Prepared>> = args.recordings.iter().map(open).collect();
     let mut all = all?;
     args.writing.check(args.output.as_deref())?;
+    let samples = samples.take().into_iter().next();
+    let pairs = pairs(args, samples.as_ref(), &all[0])?;
+    let first = all.remove(0);
     let recordings = Recordings {
-        first: all.remove(0),
+        first: pairs
+            .as_ref()
+            .and_then(|of| of.first.clone())
+            .unwrap_or(first),
         more: all,
         second: args.verify.as_ref().map(open).transpose()?,
         given: given.as_ref(),
@@ -170,17 +213,19 @@ pub fn run(args: &DiagnoseArgs, command_line: &str) -> Result<Status> {
         all: args.verbose.verbose,
         next: args.next,
     };
-    let first = samples.take().into_iter().next();
     let before = &diagnosis.before;
-    let split = first
+    let body = samples
         .as_ref()
-        .map(|of| split_turns(of, before, args.still.search()));
-    let split = split.transpose()?.flatten();
-    let body = first.map(|first| Body::of(&first, before, &Options::default()));
+        .map(|of| Body::of(of, before, &Options::default()));
     let body = body.transpose()?.flatten();
+    let delay = samples.map(|samples| accel_delay_ms(&samples, before));
+    let delay = delay.transpose()?.flatten().filter(is_found);
     let mut out = Results::new(report::diagnosis_text(found, detail));
-    if let Some(split) = &split {
-        out.say(&report::split_text(split));
+    if let Some(delay) = &delay {
+        out.say(&report::delay_text(delay));
+    }
+    if let Some(pairs) = &pairs {
+        out.say(&report::split_text(&pairs.split));
     }
     let place = diagnosis.before.prepared.place.clone();
     let refusal = args.writing.refusal(&found.judgement, &place, MISFIT);
@@ -196,13 +241,8 @@ pub fn run(args: &DiagnoseArgs, command_line: &str) -> Result<Status> {
         let made = Made::of(&args.recordings, command_line);
         Ok(report::diagnosis_page(found, &made))
     })?;
-    match &split {
-        None => out.print(&args.json, found)?,
-        Some(split) => {
-            let more = serde_json::json!({ "body": split });
-            out.print(&args.json, &report::with_sensors(found, &more))?;
-        }
-    }
+    let more = further(pairs.map(|pairs| pairs.split), delay);
+    out.print(&args.json, &Joined::of(found, more.as_ref()))?;
     match refusal {
         Some(error) => Err(error),
         None => Ok(args.strict.status(&found.judgement)),

@@ -12,7 +12,7 @@ use mimu::judgement::Judgement;
 use mimu::noise::noise_file::NoiseFile;
 use mimu::prepared::Prepared;
 use mimu::prior::Prior;
-use mimu::quantity::{PerSensor, Sensor};
+use mimu::quantity::PerSensor;
 use mimu::recording_problem::OfRecording;
 use mimu::result::fit::{DwellResult, FitResult};
 use mimu::result::sessions::SessionsResult;
@@ -37,7 +37,7 @@ use crate::reading::{LogArgs, open, read_with_samples};
 use crate::report;
 use crate::report::budget::budget_text;
 use crate::report::data_sheet::{WithDataSheet, data_sheet_text};
-use crate::report::refused;
+use crate::report::{Joined, refused};
 use crate::status::Status;
 
 /// Arguments of `mimu fit`.
@@ -163,6 +163,19 @@ impl FitArgs {
         }
     }
 
+    /// The further triads of a recording whose gyro and accelerometer have this fit.
+    fn further(&self, samples: Option<&Recording>, fit: &Fit) -> Result<Option<Body>> {
+        let Some(samples) = samples else {
+            return Ok(None);
+        };
+        let judgement = FitResult::of(fit).judgement;
+        // Beside a first triad that its calibration makes worse, the readings themselves are the better reference.
+        match judgement.needs_consent().is_some() && fit.prepared.is_in_si() {
+            true => Body::of_readings(samples, &fit.prepared.dwells.list, &self.body()),
+            false => Body::of(samples, fit, &self.body()),
+        }
+    }
+
     fn class(&self) -> PartClass {
         match self.class {
             None | Some(ClassArg::Consumer) => PartClass::Consumer,
@@ -185,48 +198,51 @@ impl FitArgs {
         }
     }
 
-    /// The fit of the recording that `open` reads, without the list of dwells after a refusal.
+    /// The fit of the recording of these `samples` that `open` reads, without the list of dwells after a refusal.
     ///
     /// # Errors
     /// The recording, or a file of the arguments, is refused; the recording does not determine the calibration.
-    pub fn fitted(&self, open: &Open, noise: Option<&NoiseFile>) -> Result<FitMade> {
+    pub fn fitted(
+        &self,
+        (open, samples): (&Open, Option<&Recording>),
+        noise: Option<&NoiseFile>,
+    ) -> Result<FitMade> {
         self.part.part()?;
         let prepared = self.complete(open(self.still.search())?, noise)?;
         let fit = fit_or_faces(prepared, self.options())?;
-        let calibration = Calibration::of(&fit, &[], &now())?;
+        let body = self.further(samples, &fit)?;
+        let raw = fit.prepared.manifest.raw_unit;
+        let mut calibration = Calibration::of(&fit, &[], &now())?;
+        calibration.body = body.iter().flat_map(|body| body.tables(raw)).collect();
         let sheet = self
             .part
             .part()?
             .map(|part| DataSheet::of(&calibration, noise, &part));
-        let result = FitResult::of(&fit);
         Ok(FitMade {
+            result: FitResult::of(&fit),
             fit,
-            result,
+            body: body.map(|body| BodyResult::of(&body, raw)),
             calibration,
             sheet,
         })
     }
 
-    /// One calibration of the sessions that `open` reads.
+    /// One calibration of the sessions that these read.
     ///
     /// # Errors
     /// As of [`Self::fitted`], or the sessions are not of one unit.
     pub fn combined(
         &self,
-        open: &[Box<Open>],
+        open: &[(Box<Open>, Option<&Recording>)],
         noise: Option<&NoiseFile>,
-    ) -> Result<(SessionsResult, Calibration)> {
-        let fitted = |open: &Open| {
+    ) -> Result<SessionsMade> {
+        let mut made = Vec::new();
+        for (open, samples) in open {
             let prepared = self.complete(open(self.still.search())?, noise)?;
-            fit_determined(prepared, self.options())
-        };
-        let fits: Result<Vec<Fit>> = open.iter().map(|open| fitted(open.as_ref())).collect();
-        let sessions = Sessions::combine(fits?, self.class())?;
-        let combined = Calibration::of_sessions(&sessions, &now())?;
-        Ok((
-            SessionsResult::of(&sessions, &combined),
-            combined.calibration,
-        ))
+            let fit = fit_determined(prepared, self.options())?;
+            made.push((self.further(*samples, &fit)?, fit));
+        }
+        SessionsMade::of(made, self.class())
     }
 }
 
@@ -241,14 +257,63 @@ pub struct FitMade {
     pub result: FitResult,
     /// The calibration that it gives.
     pub calibration: Calibration,
+    body: Option<BodyResult>,
     sheet: Option<DataSheet>,
+}
+
+/// One calibration of several sessions.
+pub struct SessionsMade {
+    sessions: Sessions,
+    /// Its result.
+    pub result: SessionsResult,
+    /// The calibration that it gives.
+    pub calibration: Calibration,
+    judgement: Judgement,
+    /// The further triads of all.
+    pub body: Option<BodyResult>,
+}
+
+impl SessionsMade {
+    /// Of the fits of the sessions, with the further triads of those that have any.
+    fn of(made: Vec<(Option<Body>, Fit)>, class: PartClass) -> Result<Self> {
+        let (bodies, fits): (Vec<Option<Body>>, Vec<Fit>) = made.into_iter().unzip();
+        let sessions = Sessions::combine(fits, class)?;
+        let combined = Calibration::of_sessions(&sessions, &now())?;
+        let result = SessionsResult::of(&sessions, &combined);
+        // A session that contradicts the others has no say in the further triads either.
+        let used = bodies.into_iter().zip(&sessions.used);
+        let used: Vec<Body> = used.filter(|of| *of.1).filter_map(|of| of.0).collect();
+        let body = (!used.is_empty()).then(|| Body::combined(&used));
+        let raw = sessions.fits[0].prepared.manifest.raw_unit;
+        let mut calibration = combined.calibration;
+        calibration.body = body.iter().flat_map(|body| body.tables(raw)).collect();
+        Ok(Self {
+            body: body.map(|body| BodyResult::of(&body, raw)),
+            judgement: combined.judgement,
+            sessions,
+            result,
+            calibration,
+        })
+    }
+
+    /// Its result as JSON.
+    pub fn json(&self) -> impl Serialize {
+        Joined::of(&self.result, self.body.as_ref())
+    }
+
+    /// What the command prints.
+    pub fn text(&self, verbose: bool) -> String {
+        let mut text = report::sessions_text(&self.result, verbose);
+        text.extend(self.body.as_ref().map(report::body_text));
+        text
+    }
 }
 
 impl FitMade {
     /// Its result as JSON.
     pub fn json(&self) -> impl Serialize {
         WithDataSheet {
-            result: &self.result,
+            result: Joined::of(&self.result, self.body.as_ref()),
             data_sheet: self.sheet.as_ref(),
         }
     }
@@ -256,6 +321,7 @@ impl FitMade {
     /// What the command prints.
     pub fn text(&self) -> String {
         let mut text = report::fit_text(&self.result, false) + &budget_text(&self.result);
+        text.extend(self.body.as_ref().map(report::body_text));
         text.extend(self.sheet.as_ref().map(data_sheet_text));
         text
     }
@@ -333,7 +399,7 @@ fn body_alone(
         "not_calibrated": why.to_string(),
         "raw_unit": raw,
     });
-    let all = report::with_sensors(&head, &more);
+    let all = Joined::of(&head, Some(&more));
     let made = || {
         let as_read = PerSensor::from_fn(|_| None);
         Calibration::of_body(
@@ -368,13 +434,7 @@ fn one(args: &FitArgs, recording: &Path) -> Result<Status> {
         }
     };
     let result = FitResult::of(&fitted);
-    let is_misfit = result.judgement.needs_consent().is_some();
-    // Beside a first triad that its calibration makes worse, the readings themselves are the better reference.
-    let body = samples.map(|samples| match is_misfit && prepared.is_in_si() {
-        true => Body::of_readings(&samples, &prepared.dwells.list, &args.body()),
-        false => Body::of(&samples, &fitted, &args.body()),
-    });
-    let body = body.transpose()?.flatten();
+    let body = args.further(samples.as_ref(), &fitted)?;
     let mut text = report::fit_text(&result, args.verbose.verbose);
     text += &budget_text(&result);
     if let Some((path, prior)) = args.prior.as_ref().zip(fitted.prepared.prior.as_ref()) {
@@ -395,13 +455,8 @@ fn one(args: &FitArgs, recording: &Path) -> Result<Status> {
         made.body = body.iter().flat_map(|body| body.tables(raw)).collect();
         Ok(made)
     };
-    match more {
-        None => write(args, text, &result, &result.judgement, &place, made),
-        Some(more) => {
-            let all = report::with_sensors(&result, &more);
-            write(args, text, &all, &result.judgement, &place, made)
-        }
-    }
+    let all = Joined::of(&result, more.as_ref());
+    write(args, text, &all, &result.judgement, &place, made)
 }
 
 /// A recording beside a trajectory.
@@ -434,29 +489,23 @@ fn beside(args: &FitArgs, by: &Trajectory) -> Result<Status> {
 
 /// One calibration of several sessions.
 fn several(args: &FitArgs) -> Result<Status> {
-    let mut further = false;
-    let mut one = |recording: &PathBuf| {
+    let one = |recording: &PathBuf| {
         let (prepared, samples) = prepared(args, recording)?;
-        further |= samples.is_some_and(|of| of.triads().len() > Sensor::BOTH.len());
-        fitted(args, prepared, fit_determined)
+        let fit = fitted(args, prepared, fit_determined)?;
+        Ok((args.further(samples.as_ref(), &fit)?, fit))
     };
-    let fits: Result<Vec<Fit>> = args.recordings.iter().map(&mut one).collect();
-    let sessions = Sessions::combine(fits?, args.class())?;
-    let combined = Calibration::of_sessions(&sessions, &now())?;
-    let result = SessionsResult::of(&sessions, &combined);
-    let mut text = report::sessions_text(&result, args.verbose.verbose);
-    if further {
-        text += "\nthe further triads of the recordings are left out: fit one recording to calibrate them\n";
-    }
+    let made: Result<Vec<_>> = args.recordings.iter().map(one).collect();
+    let all = SessionsMade::of(made?, args.class())?;
+    let mut text = all.text(args.verbose.verbose);
     if args.dwells {
-        for fit in &sessions.fits {
+        for fit in &all.sessions.fits {
             let dwells = DwellResult::list(&fit.prepared);
             text += &format!("\n{}\n{}", fit.prepared.place, report::dwell_table(&dwells));
         }
     }
-    let place = sessions.fits[0].prepared.place.clone();
-    let made = || Ok(combined.calibration.clone());
-    write(args, text, &result, &combined.judgement, &place, made)
+    let place = all.sessions.fits[0].prepared.place.clone();
+    let made = || Ok(all.calibration.clone());
+    write(args, text, &all.json(), &all.judgement, &place, made)
 }
 
 /// The calibration that `made` gives against the data sheet of the `--part`.

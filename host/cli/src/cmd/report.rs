@@ -1,5 +1,6 @@
 //! `mimu report`: arguments and execution.
 
+use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -10,6 +11,8 @@ use mimu::diagnose::Recordings;
 use mimu::diagnosed::{Diagnosed, diagnosed};
 use mimu::prepared::Prepared;
 use mimu::recording_problem::OfRecording;
+use mimu_body::{Body, Options};
+use mimu_recording::Recording;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::stage;
 
@@ -17,7 +20,7 @@ use crate::arguments::{KeepArgs, NoiseArgs, PartArgs, StillArgs, WholeTurnArgs, 
 use crate::hint::OF_A_LOG;
 use crate::opening;
 use crate::output::{check_overwritten, now, progress, show};
-use crate::reading::{LogArgs, read};
+use crate::reading::{LogArgs, read_samples};
 use crate::report::refused;
 use crate::report::{Made, Particulars, UnitReport, problems_text, unit_page};
 
@@ -100,8 +103,12 @@ pub fn run(args: &ReportArgs, command_line: &str) -> Result<()> {
     let others = [&args.noise.file, &inputs.calibration, &args.certificate];
     let others = others.map(Option::as_deref);
     let noise = args.noise.read()?;
+    // Of the first recording, whose body the page shows.
+    let samples = RefCell::new(None);
     let open = |path: &PathBuf| -> Result<(String, Prepared)> {
-        let prepared = read(path, &args.log, args.still.search(), &outputs, &others)?;
+        let read = read_samples(path, &args.log, args.still.search(), &outputs, &others)?;
+        let prepared = read.0;
+        samples.borrow_mut().get_or_insert(read.1);
         let prepared = args.whole.apply(with_noise(prepared, noise.as_ref())?)?;
         let prepared = args.keep.apply(prepared);
         Ok((path.display().to_string(), prepared))
@@ -123,7 +130,7 @@ pub fn run(args: &ReportArgs, command_line: &str) -> Result<()> {
     };
     let calibration = match (&inputs.calibration, &found) {
         (Some(path), _) => opening::calibration(path)?,
-        (None, Some(found)) => found.calibration(&now)?,
+        (None, Some(found)) => with_body(found, samples.take(), &now)?,
         // The arguments require one of the two.
         (None, None) => return Ok(()),
     };
@@ -155,6 +162,17 @@ pub fn run(args: &ReportArgs, command_line: &str) -> Result<()> {
     stage(&args.out, unit_page(&unit, &made))?.publish()?;
     let verdict = verdict(&unit);
     show(&format!("{verdict}page: {}\n", args.out.display()))
+}
+
+/// The calibration that was found, with the further triads of its first recording.
+fn with_body(found: &Diagnosed, first: Option<Recording>, created: &str) -> Result<Calibration> {
+    let mut made = found.calibration(created)?;
+    let before = &found.diagnosis.before;
+    let body = first.map(|first| Body::of(&first, before, &Options::default()));
+    let raw = before.prepared.manifest.raw_unit;
+    let body = body.transpose()?.flatten();
+    made.body = body.iter().flat_map(|body| body.tables(raw)).collect();
+    Ok(made)
 }
 
 /// The whole turns in recordings: name, whether the calibration was made from it, and degrees for each turn about each axis.

@@ -83,7 +83,7 @@ pub(crate) fn fitted(recording: &Recording, by: &Trajectory) -> Result<Made> {
     });
     Ok(Made {
         text: report::trajectory_text(&recording.place, &of, &instrument, &judgement),
-        json: report::with_sensors(&head, &of),
+        json: json!(report::Joined::of(&head, Some(&of))),
         judgement,
         found,
     })

@@ -1,6 +1,7 @@
 //! `mimu verify`.
 
 use std::cell::RefCell;
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -11,7 +12,9 @@ use mimu::judgement::Judgement;
 use mimu::noise::noise_file::NoiseFile;
 use mimu::prepared::Prepared;
 use mimu::signal::stillness::DwellSearch;
+use mimu_body::TriadVerification;
 use mimu_export::fitting_convention::{self, Reading};
+use mimu_recording::Recording;
 use mimu_recording::error::Result;
 use serde::Serialize;
 use serde_json::json;
@@ -24,8 +27,8 @@ use crate::hint::OF_A_LOG;
 use crate::opening::{self, Opened};
 use crate::output::print;
 use crate::reading::{LogArgs, open, read_with_samples};
-use crate::report;
 use crate::report::data_sheet::{WithDataSheet, data_sheet_text};
+use crate::report::{self, Joined};
 use crate::status::Status;
 
 /// Arguments of `mimu verify`.
@@ -93,21 +96,14 @@ pub(crate) fn run(args: &VerifyArgs) -> Result<Status> {
             Ok((calibration, Some((text, readings))))
         }
     })?;
-    let further = samples
-        .take()
-        .map(|of| mimu_body::verify(&of, &made.calibration));
-    let further = further.transpose()?.unwrap_or_default();
-    let text = made.text(args.verbose.verbose);
-    if further.is_empty() {
-        print(&args.json, &text, &made.json(), None)?;
-    } else {
-        let text = text + &report::body_errors_text(&further);
-        let all = report::with_sensors(&made.json(), &json!({ "sensors": further }));
-        print(&args.json, &text, &all, None)?;
-    }
-    let judged = further.into_values().map(|of| of.judgement);
-    let all = Judgement::worst([made.result.judgement.clone()].into_iter().chain(judged));
-    Ok(args.strict.status(&all.unwrap_or(made.result.judgement)))
+    let made = made.with_body(samples.take().as_ref())?;
+    print(
+        &args.json,
+        &made.text(args.verbose.verbose),
+        &made.json(),
+        None,
+    )?;
+    Ok(args.strict.status(&made.judgement()))
 }
 
 impl VerifyArgs {
@@ -139,6 +135,7 @@ impl VerifyArgs {
             sheet: part.map(|part| DataSheet::of(&calibration, noise, &part)),
             read,
             calibration,
+            further: BTreeMap::new(),
         })
     }
 }
@@ -150,6 +147,7 @@ pub struct Verified {
     sheet: Option<DataSheet>,
     read: Option<Read>,
     calibration: Calibration,
+    further: BTreeMap<String, TriadVerification>,
 }
 
 /// How the file of another program was read: as text, and each triad.
@@ -165,11 +163,33 @@ struct WithReadings<'a, T: Serialize> {
 }
 
 impl Verified {
+    /// With the further triads that both the calibration and the recording have.
+    ///
+    /// # Errors
+    /// The samples cannot be read.
+    pub fn with_body(mut self, samples: Option<&Recording>) -> Result<Self> {
+        if let Some(samples) = samples {
+            self.further = mimu_body::verify(samples, &self.calibration)?;
+        }
+        Ok(self)
+    }
+
+    /// The worst judgement of all triads.
+    fn judgement(&self) -> Judgement {
+        let first = self.result.judgement.clone();
+        let further = self.further.values().map(|of| of.judgement.clone());
+        further.fold(
+            first,
+            |worst, next| if next.kind > worst.kind { next } else { worst },
+        )
+    }
+
     /// Its result as JSON.
     pub fn json(&self) -> impl Serialize {
+        let further = (!self.further.is_empty()).then(|| json!({ "sensors": self.further }));
         WithReadings {
             result: WithDataSheet {
-                result: &self.result,
+                result: Joined::of(&self.result, further.as_ref()),
                 data_sheet: self.sheet.as_ref(),
             },
             conventions: self.read.as_ref().map(|(_, all)| all.as_slice()),
@@ -184,6 +204,9 @@ impl Verified {
             .map(|read| read.0.clone())
             .unwrap_or_default();
         text += &report::verify_text(&self.result, verbose);
+        if !self.further.is_empty() {
+            text += &report::body_errors_text(&self.further);
+        }
         text.extend(self.sheet.as_ref().map(data_sheet_text));
         text
     }

@@ -2,7 +2,8 @@
 
 use maud::html;
 use mimu::calibration::apply::Applied;
-use mimu::quantity::plural;
+use mimu::quantity::{Sensor, plural, significant};
+use mimu_body::aligned::MeanUnit;
 
 use super::page::all_warnings;
 use super::terminal::text;
@@ -29,10 +30,29 @@ pub fn apply_text(applied: &Applied) -> String {
                 p {
                     (of.triad) ": in " (of.unit) ", "
                     @if let Some(frame) = of.frame { "in the frame of " (frame) } @else { "in its own frame" }
-                    @if of.empty > 0 { "; " (plural(of.empty, "sample")) " without a reading, left empty" }
+                    @if let Some(delay) = of.delay_ms { ", moved by its delay of " (significant(delay)) " ms" }
+                    @if of.empty > 0 { "; " (plural(of.empty, "sample")) " without a reading or beside one at a rail, left empty" }
                 }
             }
         }
         (all_warnings(&applied.warnings))
     })
+}
+
+/// The mean unit of an array.
+pub fn mean_text(mean: &MeanUnit) -> String {
+    let names = |of: &[mimu_recording::TriadName]| {
+        of.iter()
+            .map(ToString::to_string)
+            .collect::<Vec<_>>()
+            .join(", ")
+    };
+    text(&html! { section {
+        p { "gyro and accel are the mean of the first and of " (names(&mean.triads)) }
+        @if !mean.left_out.is_empty() { p { "left out of it, because their place on the body is not known: " (names(&mean.left_out)) } }
+        @for (sensor, noise) in mean.noise.present() {
+            @let [first, all] = noise.map(|rms| significant(rms * if sensor == Sensor::Gyro { 1f64.to_degrees() } else { 1e3 }));
+            p { "noise of a reading of " (sensor) ": " (first) " of the first, " (all) " of the mean, " @if sensor == Sensor::Gyro { "deg/s" } @else { "mm/s²" } }
+        }
+    } })
 }

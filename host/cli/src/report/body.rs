@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use maud::{Markup, html};
 use mimu::judgement::JudgementKind;
 use mimu::quantity::{p_value, plural, significant};
+use mimu::triad::Estimate;
 use mimu_body::TriadVerification;
 use mimu_body::result::{BodyResult, EstimateResult, PlaceResult};
 use mimu_body::split::{Part, Split};
@@ -35,64 +36,91 @@ pub(crate) fn body_errors_text(found: &BTreeMap<String, TriadVerification>) -> S
     )
 }
 
+/// The delay of a unit's accelerometer against its gyro, as text.
+pub(crate) fn delay_text(delay_ms: &Estimate) -> String {
+    let (later, ms) = match delay_ms.value > 0.0 {
+        true => ("later", delay_ms.value),
+        false => ("earlier", -delay_ms.value),
+    };
+    let [ms, interval] = [ms, delay_ms.interval].map(significant);
+    format!(
+        "\naccelerometer: {ms} ± {interval} ms {later} than the gyro, by the velocity at rest around turns\n"
+    )
+}
+
 /// What turns err by in common to all pairs of a body, and each for itself, as text.
 pub(crate) fn split_text(split: &Split) -> String {
-    let degrees = |part: &Part, label: &str| {
+    let degrees = |part: &Part, label: &str, judged: &str| {
         html! { tr {
             td { (label) } (between(part.rms, [part.lower, part.upper], 1f64.to_degrees())) (number(part.noise_floor, 1f64.to_degrees()))
+            td { (judged) }
         } }
     };
+    let judged = |pair: &u8| split.judged.get(pair).map_or("", |of| of.kind.name());
+    format!(
+        "\n{}",
+        text(&html! {
+            h2 { "Pairs of the body" }
+            (table("Errors of the direction of gravity after each turn, of the fit, with 95 % intervals; noise: of the pair, or what is known to be common; judged: by its own part", &html! {
+                th { "error of " (plural(split.turns as u64, "turn")) ", deg" } th.n { "rms" } th.n { "noise" } th { "judged" }
+            }, &html! {
+                (degrees(&split.common, "common to all pairs", ""))
+                @for (pair, own) in &split.own { (degrees(own, &format!("of pair {pair} alone"), judged(pair))) }
+            }))
+            p.line { (common_cause(split)) }
+            @if !split.judged.is_empty() { p.line { "the diagnosis of the first pair is of its own part: the mean error of the others is taken out of its turns" } }
+            @for (pair, judgement) in split.judged.iter().filter(|(_, of)| !of.is_good()) { p.line { "pair " (pair) " is judged " (judgement) } }
+        })
+    )
+}
+
+/// Where the part comes from that all pairs share.
+fn common_cause(split: &Split) -> String {
     let causes = split.correlations.iter().filter(|c| c.is_significant);
     let causes: Vec<String> = causes
         .map(|c| {
-            format!(
-                "{} ({} {}, {})",
-                c.term,
-                c.covariate,
-                significant(c.coefficient),
-                p_value(c.p)
-            )
+            let (size, p) = (significant(c.coefficient), p_value(c.p));
+            format!("{} ({} {size}, {p})", c.term, c.covariate)
         })
         .collect();
-    let said = match (split.exceeds_noise, causes.is_empty()) {
+    match (split.exceeds_noise, causes.is_empty()) {
         (false, _) => {
-            "the pairs share no error beyond noise: what remains is of each sensor".to_string()
+            "the pairs share no error beyond noise: what remains is of each sensor".into()
         }
         (true, true) => {
             "all pairs err together: it is the motion, its sampling or the clock, and no sensor"
-                .to_string()
+                .into()
         }
         (true, false) => format!(
             "all pairs err together, and more so with {}: the cause is not in a sensor",
             causes.join(", ")
         ),
-    };
-    format!(
-        "\n{}",
-        text(&html! {
-            h2 { "Pairs of the body" }
-            (table("Errors of the direction of gravity after each turn, of the fit, with 95 % intervals; noise: of the pair, or what is known to be common", &html! {
-                th { "error of " (plural(split.turns as u64, "turn")) ", deg" } th.n { "rms" } th.n { "noise" }
-            }, &html! {
-                (degrees(&split.common, "common to all pairs"))
-                @for (pair, own) in &split.own { (degrees(own, &format!("of pair {pair} alone"))) }
-            }))
-            p.line { (said) }
-        })
-    )
+    }
 }
 
-/// A result with the further triads among its sensors, as JSON.
-pub(crate) fn with_sensors(result: &impl Serialize, more: &impl Serialize) -> Value {
-    let [mut all, more] = [json!(result), json!(more)];
-    let further = more.as_object().into_iter().flatten();
-    for (key, value) in further {
-        match (all[key].as_object_mut(), value.as_object()) {
-            (Some(own), Some(value)) => own.extend(value.clone()),
-            _ => all[key] = value.clone(),
+/// A result as JSON: alone, or with the further triads among its sensors.
+#[derive(Serialize)]
+#[serde(untagged)]
+pub(crate) enum Joined<'a, T> {
+    Alone(&'a T),
+    Body(Value),
+}
+
+impl<'a, T: Serialize> Joined<'a, T> {
+    /// Of a result, and what a body adds to it.
+    pub fn of(result: &'a T, more: Option<&impl Serialize>) -> Self {
+        let Some(more) = more else {
+            return Self::Alone(result);
+        };
+        let [mut all, more] = [json!(result), json!(more)];
+        for (key, value) in more.as_object().into_iter().flatten() {
+            match (all[key].as_object_mut(), value.as_object()) {
+                (Some(own), Some(value)) => own.extend(value.clone()),
+                _ => all[key] = value.clone(),
+            }
         }
+        Self::Body(all)
     }
-    all
 }
 
 /// The section of a document.

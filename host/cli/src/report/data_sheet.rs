@@ -12,7 +12,7 @@ use super::terminal::text;
 pub(crate) struct WithDataSheet<'a, T: Serialize> {
     /// The result.
     #[serde(flatten)]
-    pub result: &'a T,
+    pub result: T,
     /// The unit against the data sheet; absent without `--part`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub data_sheet: Option<&'a DataSheet>,

@@ -1,7 +1,7 @@
 //! A recording compensated by a calibration, sample by sample.
 //!
 //! It uses the compensator of `core`, in double precision, so it writes what the device streams. Further triads of a body get C and o, and are rotated into
-//! the frame of their reference. Their times stay: a delay is not taken out, and no lever arm.
+//! the frame of their reference. Their times stay; the crate `mimu-body` moves them by their delays.
 
 use std::path::Path;
 
@@ -75,6 +75,9 @@ pub struct AppliedTriad {
     pub unit: String,
     /// The triad in whose frame its columns are; null for its own frame, if its rotation is not known.
     pub frame: Option<TriadName>,
+    /// By how much its readings were moved to be at the instants of its reference, ms.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub delay_ms: Option<f64>,
     /// Samples that are empty because an axis has no reading.
     pub empty: u64,
 }
@@ -101,22 +104,10 @@ pub fn apply(
     replace: bool,
     progress: impl Fn(f64),
 ) -> Result<Applied> {
-    if let (Ok(from), Ok(to)) = (recording.directory.canonicalize(), out.canonicalize())
-        && from.starts_with(&to)
-    {
-        let problem = "this is the recording to compensate; its raw readings would be lost";
-        return Err(Error::new(out.display(), problem, "choose another name"));
-    }
-    let mut compensated = Compensated::new(recording, calibration, |share| progress(0.5 * share))?;
-    let mut writer = Writer::create(out, compensated.columns, format, replace)?;
-    compensated.for_each(
-        |share| progress(0.5 + 0.5 * share),
-        |_, clean| writer.write(clean),
-    )?;
-    let rows = writer.rows();
-    let manifest = compensated_manifest(recording, &compensated.condensed.sha256);
-    let written = writer.finish(&manifest)?;
-    Ok(compensated.into_applied(&written, rows))
+    let compensated = Compensated::new(recording, calibration, |share| progress(0.5 * share))?;
+    let columns = compensated.columns;
+    let to = (out, format, replace);
+    compensated.write(to, columns, |_| (), |share| progress(0.5 + 0.5 * share))
 }
 
 /// A recording with its compensation, to be run through once.
@@ -195,6 +186,39 @@ impl<'a> Compensated<'a> {
         })
     }
 
+    /// The columns of the compensated samples.
+    pub fn columns(&self) -> Columns {
+        self.columns
+    }
+
+    /// Writes a recording with these `columns` in this format to a directory, which may be replaced or not; `change` has each batch of compensated samples before.
+    ///
+    /// # Errors
+    /// Those of [`apply`].
+    pub fn write(
+        mut self,
+        (out, format, replace): (&Path, SampleFormat, bool),
+        columns: Columns,
+        mut change: impl FnMut(&mut Batch),
+        progress: impl Fn(f64),
+    ) -> Result<Applied> {
+        if let (Ok(from), Ok(to)) = (self.recording.directory.canonicalize(), out.canonicalize())
+            && from.starts_with(&to)
+        {
+            let problem = "this is the recording to compensate; its raw readings would be lost";
+            return Err(Error::new(out.display(), problem, "choose another name"));
+        }
+        let mut writer = Writer::create(out, columns, format, replace)?;
+        self.for_each(progress, |_, clean| {
+            change(clean);
+            writer.write(clean)
+        })?;
+        let rows = writer.rows();
+        let manifest = compensated_manifest(self.recording, &self.condensed.sha256);
+        let written = writer.finish(&manifest)?;
+        Ok(self.into_applied(&written, rows))
+    }
+
     /// The result, after `rows` were written to `out`.
     pub fn into_applied(self, out: &Path, rows: u64) -> Applied {
         let (counts, has) = (self.batches.counts, self.batches.has);
@@ -237,10 +261,10 @@ impl<'a> Compensated<'a> {
     pub fn for_each(
         &mut self,
         progress: impl Fn(f64),
-        mut consume: impl FnMut(&Batch, &Batch) -> Result<()>,
+        mut consume: impl FnMut(&Batch, &mut Batch) -> Result<()>,
     ) -> Result<()> {
         let batches = &mut self.batches;
-        let each = |batch: &Batch| consume(batch, &batches.batch(batch));
+        let each = |batch: &Batch| consume(batch, &mut batches.batch(batch));
         self.recording.for_each_batch(progress, each)?;
         Ok(())
     }
@@ -270,6 +294,7 @@ fn further(
             triad: name,
             unit: triad.unit.clone(),
             frame: triad.rotation_deg.map(|_| triad.reference),
+            delay_ms: None,
             empty: 0,
         };
         all.push((triad.in_reference(), applied));
