@@ -1,15 +1,19 @@
 //! Messages `sensor_msgs/Imu` and `sensor_msgs/MagneticField` of ROS 1 bags (version 2.0), of ROS 2 bags in SQLite files, and of MCAP files.
 //!
-//! Their time is the stamp of the header, which the driver has set. Only if it sets none, the time of reception is used. Messages of other types are not read,
-//! even if they contain one of these.
+//! Their time is the stamp of the header, which the driver has set. Only if it sets none, the time of reception is used. A message of another type is read
+//! if it contains a `sensor_msgs/Imu`, and the file has its definition.
 //!
 //! Drivers whose gyro and accelerometer have separate clocks publish two topics, each with one half of the message: the other half is 0, or its
 //! covariance begins with -1, which the definition of the message reserves for this.
+
+mod definition;
 
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
+
+use definition::Before;
 
 use super::decimal::Decimal;
 use super::instance::Instance;
@@ -92,23 +96,33 @@ struct Topic {
     kind: String,
     /// What its messages are; `None` if they are of another kind or encoding.
     read: Option<(Kind, Layout)>,
+    /// What stands before the `sensor_msgs/Imu` of a message that contains one.
+    before: Option<Before>,
     messages: Vec<Message>,
     /// Messages that end early.
     cut: u64,
 }
 
 impl Topic {
-    fn new(name: &str, kind: &str, encoding: &str) -> Self {
+    /// `definition` is that of its messages, if the file has it.
+    fn new(name: &str, kind: &str, encoding: &str, definition: &str) -> Self {
         let layout = match encoding {
             "ros1" => Some(Layout::Ros1),
             "cdr" => Some(Layout::Cdr),
             _ => None,
         };
         let known = KINDS.iter().find(|(_, names)| names.contains(&kind));
+        let known = known.map(|(kind, _)| *kind);
+        let before = match known {
+            None => Before::of(kind, definition),
+            Some(_) => None,
+        };
+        let within = before.as_ref().map(|_| Kind::Imu);
         Self {
             name: name.to_owned(),
             kind: kind.to_owned(),
-            read: known.and_then(|(kind, _)| Some((*kind, layout?))),
+            read: known.or(within).zip(layout),
+            before,
             messages: Vec::new(),
             cut: 0,
         }
@@ -122,7 +136,7 @@ impl Topic {
         let Some((kind, layout)) = self.read else {
             return;
         };
-        match parse(data, kind, layout) {
+        match parse(data, kind, layout, self.before.as_ref()) {
             Some(message) => self.messages.push(Message {
                 received_ns,
                 ..message
@@ -199,6 +213,11 @@ impl Topic {
                 ));
             }
             false => {}
+        }
+        if self.before.is_some() {
+            let kind = &self.kind;
+            let note = format!("{name}: the sensor_msgs/Imu within {kind} is read");
+            readings.notes.push(note);
         }
         readings
     }
@@ -342,7 +361,12 @@ fn messages_of_bag(path: &Path) -> Result<Topics> {
     let mut topics = Topics::new();
     for record in bag.index_records() {
         if let IndexRecord::Connection(connection) = record.map_err(damaged)? {
-            let topic = Topic::new(connection.storage_topic, connection.tp, "ros1");
+            let topic = Topic::new(
+                connection.storage_topic,
+                connection.tp,
+                "ros1",
+                connection.message_definition,
+            );
             topics.entry(connection.id).or_insert(topic);
         }
     }
@@ -403,7 +427,7 @@ fn messages_of_mcap(path: &Path) -> Result<Topics> {
     let options = LinearReaderOptions::default().with_record_length_limit(LONGEST_RECORD);
     let mut reader = LinearReader::new_with_options(options);
     let mut topics = Topics::new();
-    let mut schemas: BTreeMap<u16, String> = BTreeMap::new();
+    let mut schemas: BTreeMap<u16, (String, String)> = BTreeMap::new();
     while let Some(event) = reader.next_event() {
         match event.map_err(damaged)? {
             LinearReadEvent::ReadRequest(wanted) => {
@@ -413,12 +437,15 @@ fn messages_of_mcap(path: &Path) -> Result<Topics> {
             }
             LinearReadEvent::Record { data, opcode } => {
                 match mcap::parse_record(opcode, data).map_err(damaged)? {
-                    Record::Schema { header, .. } => {
-                        schemas.insert(header.id, header.name);
+                    Record::Schema { header, data } => {
+                        let definition = String::from_utf8_lossy(&data).into_owned();
+                        schemas.insert(header.id, (header.name, definition));
                     }
                     Record::Channel(channel) => {
-                        let kind = schemas.get(&channel.schema_id).map_or("", String::as_str);
-                        let topic = Topic::new(&channel.topic, kind, &channel.message_encoding);
+                        let none = Default::default();
+                        let (kind, definition) = schemas.get(&channel.schema_id).unwrap_or(&none);
+                        let encoding = &channel.message_encoding;
+                        let topic = Topic::new(&channel.topic, kind, encoding, definition);
                         // A channel occurs again at the end of the file.
                         topics.entry(u32::from(channel.id)).or_insert(topic);
                     }
@@ -468,8 +495,20 @@ fn messages_of_database(path: &Path) -> std::result::Result<Topics, String> {
     let columns = ["id", "name", "type", "serialization_format"].map(|name| topics.column(name));
     let [id, name, kind, encoding] = columns;
     let (id, name, kind, encoding) = (id?, name?, kind?, encoding?);
+    // From Iron on.
+    let mut definitions: BTreeMap<String, String> = BTreeMap::new();
+    if let Some(table) = tables.get("message_definitions") {
+        let of = table.column("topic_type")?;
+        let text = table.column("encoded_message_definition")?;
+        database.each_row(table, |row| {
+            definitions.insert(row.text(of)?, row.text(text)?);
+            Ok(())
+        })?;
+    }
     database.each_row(topics, |row| {
-        let topic = Topic::new(&row.text(name)?, &row.text(kind)?, &row.text(encoding)?);
+        let kind = row.text(kind)?;
+        let definition = definitions.get(&kind).map_or("", String::as_str);
+        let topic = Topic::new(&row.text(name)?, &kind, &row.text(encoding)?, definition);
         let number = u32::try_from(row.integer(id)?).map_err(|_| "a topic has no number")?;
         found.insert(number, topic);
         Ok(())
@@ -560,9 +599,17 @@ fn fields_of(data: &[u8], layout: Layout) -> Option<Fields<'_>> {
     })
 }
 
-/// A message; `None` if it is cut.
-fn parse(data: &[u8], kind: Kind, layout: Layout) -> Option<Message> {
+/// A message, or that within it behind the fields `before`; `None` if it is cut.
+fn parse(data: &[u8], kind: Kind, layout: Layout, before: Option<&Before>) -> Option<Message> {
     let mut fields = fields_of(data, layout)?;
+    let mut outer_ns = 0;
+    if let Some(before) = before {
+        if before.header {
+            outer_ns = fields.stamp_ns(layout)?;
+            fields.at = 0;
+        }
+        before.pass(&mut fields)?;
+    }
     let stamp_ns = fields.stamp_ns(layout)?;
     fields.text()?; // frame
     let (values, absent) = match kind {
@@ -581,7 +628,7 @@ fn parse(data: &[u8], kind: Kind, layout: Layout) -> Option<Message> {
         }
     };
     Some(Message {
-        stamp_ns,
+        stamp_ns: if stamp_ns == 0 { outer_ns } else { stamp_ns },
         received_ns: 0,
         absent,
         values,

@@ -61,6 +61,65 @@ fn the_messages_of_a_bag_of_ros_1_and_of_ros_2_and_of_an_mcap_file_are_those_tha
     check("imu.db3", Some("/imu/data"));
 }
 
+/// `wrapper.db3` was written with Python's `sqlite3` and `struct`: the 24 messages of the other files, each behind fields of all kinds in a message of
+/// another package, whose definition is in the table of Iron.
+#[test]
+fn a_message_within_another_is_found_by_the_definition_in_the_file() {
+    check("wrapper.db3", None);
+    let definition = "Header header\nuint16 x\nOuter/Part[] parts\nsensor_msgs/Imu imu\n\
+        ===\nMSG: outer/Part\ntime when\nstring text\n===\nMSG: std_msgs/Header\nuint32 seq\ntime stamp\nstring frame_id\n\
+        ===\nMSG: sensor_msgs/Imu\nHeader header\n";
+    let definition = definition.replace("Outer/", "outer/");
+    let before = Before::of("outer/Whole", &definition).unwrap();
+    // By the serialisation of ROS 1: little endian, without padding.
+    let header = |s: u32| {
+        [
+            &7_u32.to_le_bytes()[..],
+            &s.to_le_bytes(),
+            &9_u32.to_le_bytes(),
+            &1_u32.to_le_bytes(),
+            b"f",
+        ]
+        .concat()
+    };
+    let text = [
+        &1_u32.to_le_bytes()[..],
+        &2_u32.to_le_bytes(),
+        &3_u32.to_le_bytes(),
+        b"abc",
+    ]
+    .concat();
+    let numbers: Vec<u8> = (0..37).flat_map(|k| f64::from(k).to_le_bytes()).collect();
+    let message = |inner: u32| {
+        [
+            header(5),
+            vec![0, 0],
+            2_u32.to_le_bytes().to_vec(),
+            text.clone(),
+            text.clone(),
+            header(inner),
+            numbers.clone(),
+        ]
+        .concat()
+    };
+    let imu = parse(&message(6), Kind::Imu, Layout::Ros1, Some(&before)).unwrap();
+    assert_eq!(
+        (imu.stamp_ns, imu.values),
+        (6_000_000_009, [13.0, 14.0, 15.0, 25.0, 26.0, 27.0])
+    );
+    for cut in 0..message(6).len() - 72 {
+        assert!(
+            parse(&message(6)[..cut], Kind::Imu, Layout::Ros1, Some(&before)).is_none(),
+            "{cut}"
+        );
+    }
+    assert_eq!(Before::of("outer/Whole", "string text\n"), None);
+    assert_eq!(
+        Before::of("outer/Whole", "outer/Whole again\nsensor_msgs/Imu imu\n"),
+        None
+    );
+}
+
 #[test]
 fn magnetometers_are_read_beside_the_topic_of_an_imu_and_zeros_are_none() {
     let message = |stamp: u32, field: [f64; 3]| {
@@ -72,7 +131,7 @@ fn magnetometers_are_read_beside_the_topic_of_an_imu_and_zeros_are_none() {
     let mut topics = Topics::new();
     for (number, name) in (0..).zip(["/mag", "/none", "/second", "/imu"]) {
         let kind = format!("sensor_msgs/{}", kinds[number as usize]);
-        topics.insert(number, Topic::new(name, &kind, "ros1"));
+        topics.insert(number, Topic::new(name, &kind, "ros1", ""));
     }
     for i in [2, 1, 3_u32] {
         let x = f64::from(i) * 1e-6;
