@@ -62,7 +62,7 @@ def read(
     ``{"+x": "a.csv", "-x": "b.csv", ...}``. For a turntable with known rates, give ``rate_dps="200,270"`` and ``rate_error="0.3%"``.
     If a file has both sensors in different rows, give two lists of ``columns`` and ``where={"flag": [1, 2]}``. ``rows="..8799"`` reads these data rows
     only. ``skip_broken=True`` leaves out up to 1 % of rows that cannot be read. ``trust_readings=True`` uses readings that look
-    like those of two devices, or wrongly coded.
+    wrongly coded, or of another range from some row on.
 
     The recording is written to ``output``, or to a temporary folder that is removed with it. Its ``imported`` and ``warnings`` are the results
     of the import.

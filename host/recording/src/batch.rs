@@ -3,6 +3,9 @@
 use super::columns::{Column, Columns};
 use super::triad_name::TriadName;
 
+/// Rows of Parquet that are decoded at a time: 1 MiB of numbers in each column.
+pub(super) const SLICE: usize = 1 << 17;
+
 /// Consecutive rows of a recording, one vector a column.
 ///
 /// Every vector is either empty (the recording lacks that column) or [`Batch::len`] long.

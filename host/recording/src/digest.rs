@@ -99,16 +99,4 @@ mod tests {
             (7, known.to_owned())
         );
     }
-
-    #[test]
-    fn a_failure_of_the_work_is_passed_on() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("x");
-        std::fs::write(&path, vec![0; 1 << 20]).unwrap();
-        let fail = || Err::<(), _>(Error::new("here", "no", "try"));
-        assert_eq!(
-            while_hashing(&path, fail).unwrap_err().refused().problem,
-            "no"
-        );
-    }
 }

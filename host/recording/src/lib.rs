@@ -47,14 +47,7 @@ mod triads;
 mod turntable;
 mod unit_name;
 mod warning;
-#[cfg(not(feature = "parquet"))]
-mod without_parquet;
 mod writer;
-
-#[cfg(not(feature = "parquet"))]
-use without_parquet as parquet_file;
-#[cfg(not(feature = "parquet"))]
-use without_parquet as parquet_writer;
 
 pub use batch::Batch;
 pub use clock::{ClockRate, REFUSED_SHARE, REPORTED_SHARE, Times};

@@ -357,14 +357,6 @@ reference = "table"
     }
 
     #[test]
-    fn the_manifest_of_the_design_is_read() {
-        let manifest = Manifest::parse(GOOD, "x").unwrap();
-        assert_eq!(manifest.sample_rate_hz, 1000.0);
-        assert_eq!(manifest.raw_unit, RawUnit::Volt);
-        assert_eq!(manifest.reference, Reference::Table);
-    }
-
-    #[test]
     fn every_key_comes_back_from_the_written_text() {
         let mut manifest = Manifest::new("µ \"7\"", 102.4, 9.81, RawUnit::Si, Reference::Gravity);
         manifest.latitude_deg = Some(-30.5);
@@ -391,22 +383,6 @@ reference = "table"
         }];
         let text = manifest.to_toml().unwrap();
         assert_eq!(Manifest::parse(&text, "x").unwrap(), manifest);
-    }
-
-    #[test]
-    fn an_unknown_key_is_named_with_its_line() {
-        let text = refused(&format!("{GOOD}sample_rate = 3\n"));
-        assert!(
-            text.contains("line 7") && text.contains("sample_rate"),
-            "{text}"
-        );
-        let text = refused(&format!("{GOOD}\n[rails]\nmagnet = [0, 1]\n"));
-        assert!(text.contains("line 9") && text.contains("magnet"), "{text}");
-    }
-
-    #[test]
-    fn a_missing_key_is_named() {
-        assert!(refused(&GOOD.replace("device", "#")).contains("device"));
     }
 
     #[test]

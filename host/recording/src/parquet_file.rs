@@ -10,20 +10,17 @@ use parquet::data_type::DataType;
 use parquet::errors::ParquetError;
 use parquet::file::metadata::{ParquetMetaData, ParquetMetaDataReader};
 use parquet::file::serialized_reader::SerializedPageReader;
+use parquet::schema::types::Type;
 
 use super::ahead::{ahead, reader_panicked};
-use super::batch::Batch;
+use super::batch::{Batch, SLICE};
 use super::cell::{self, Refusal, shorten};
 use super::columns::{Column, Layout};
-use super::csv_writer::write_number;
 use super::strict_file::StrictFile;
 use crate::error::{Error, Result};
 
 #[cfg(test)]
 mod tests;
-
-/// Rows that are decoded at a time: 1 MiB of numbers in each column.
-pub(super) const SLICE: usize = 1 << 17;
 
 /// Most numbers for which a column's vector is reserved in advance: half a GiB, which is used page by page as it fills.
 const MOST_RESERVED: u64 = 1 << 26;
@@ -94,6 +91,26 @@ impl ParquetFile {
         let root = self.metadata.file_metadata().schema_descr().root_schema();
         let fields = root.get_fields().iter();
         fields.map(|field| field.name().to_owned()).collect()
+    }
+
+    /// Number of its columns.
+    pub fn width(&self) -> usize {
+        let schema = self.metadata.file_metadata().schema_descr();
+        schema.root_schema().get_fields().len()
+    }
+
+    /// The schema of the columns at these positions alone.
+    pub fn schema_of(&self, columns: &[usize]) -> Type {
+        let root = self.metadata.file_metadata().schema_descr().root_schema();
+        let mut fields = root.get_fields().to_vec();
+        let mut at = 0;
+        fields.retain(|_| {
+            at += 1;
+            columns.contains(&(at - 1))
+        });
+        let group = Type::group_type_builder(root.name()).with_fields(fields);
+        // A part of a schema that was read is one too.
+        group.build().unwrap_or_else(|_| root.clone())
     }
 
     /// The column called `name`, checked to be flat and of a type that becomes a number, or text.
@@ -302,16 +319,8 @@ fn decode_slice(
     Ok(Decoded::Values(values))
 }
 
-/// A stored value.
-enum Value<'a> {
-    Float(f64),
-    Whole(i64),
-    Unsigned(u64),
-    Text(&'a [u8]),
-}
-
 /// Reads one column from front to back, across its row groups.
-pub(super) struct Cursor {
+struct Cursor {
     source: ParquetFile,
     leaf: Leaf,
     file: Option<Arc<StrictFile>>,
@@ -337,77 +346,31 @@ impl Cursor {
         }
     }
 
-    /// Appends the next `count` numbers, NaN for null.
+    /// Appends the next `count` numbers, NaN for null. Beyond 2^53 the double nearest to a whole number is used: no sensor resolves more.
     pub fn read(&mut self, count: usize, values: &mut Vec<f64>) -> std::result::Result<(), String> {
-        values.reserve(count);
-        self.read_as(count, (values, f64::NAN), |value| match value {
-            Value::Float(value) => value,
-            // Beyond 2^53 the nearest double is used: no sensor resolves more.
-            Value::Whole(value) => value as f64,
-            Value::Unsigned(value) => value as f64,
-            Value::Text(_) => f64::NAN,
-        })
-    }
-
-    /// Appends the next `count` values as text, empty for null. Numbers read back exactly.
-    pub fn read_cells(
-        &mut self,
-        count: usize,
-        cells: &mut Vec<Vec<u8>>,
-    ) -> std::result::Result<(), String> {
-        self.read_as(count, (cells, Vec::new()), |value| match value {
-            Value::Float(value) => {
-                let mut text = Vec::new();
-                write_number(value, &mut text);
-                text
-            }
-            Value::Whole(value) => value.to_string().into_bytes(),
-            Value::Unsigned(value) => value.to_string().into_bytes(),
-            Value::Text(text) => text.to_vec(),
-        })
-    }
-
-    /// Appends the next `count` values as `of` converts them, with `null` for each null.
-    fn read_as<V: Clone>(
-        &mut self,
-        count: usize,
-        (values, null): (&mut Vec<V>, V),
-        of: impl Fn(Value<'_>) -> V,
-    ) -> std::result::Result<(), String> {
         use ColumnReader as Reader;
+        values.reserve(count);
         let unsigned = self.leaf.unsigned;
-        self.advance(count, |reader, levels, count| {
-            let into = (&mut *values, null.clone());
-            match reader {
-                Reader::DoubleColumnReader(reader) => {
-                    append(reader, count, levels, into, |v| of(Value::Float(v)))
+        self.advance(count, |reader, levels, count| match reader {
+            Reader::DoubleColumnReader(reader) => append(reader, count, levels, values, |v| v),
+            Reader::FloatColumnReader(reader) => append(reader, count, levels, values, f64::from),
+            Reader::Int32ColumnReader(reader) => append(reader, count, levels, values, |v| {
+                if unsigned {
+                    v.cast_unsigned().into()
+                } else {
+                    v.into()
                 }
-                Reader::FloatColumnReader(reader) => {
-                    append(reader, count, levels, into, |v| of(Value::Float(v.into())))
+            }),
+            Reader::Int64ColumnReader(reader) => append(reader, count, levels, values, |v| {
+                if unsigned {
+                    v.cast_unsigned() as f64
+                } else {
+                    v as f64
                 }
-                Reader::Int32ColumnReader(reader) if unsigned => {
-                    append(reader, count, levels, into, |v| {
-                        of(Value::Unsigned(v.cast_unsigned().into()))
-                    })
-                }
-                Reader::Int32ColumnReader(reader) => {
-                    append(reader, count, levels, into, |v| of(Value::Whole(v.into())))
-                }
-                Reader::Int64ColumnReader(reader) if unsigned => {
-                    append(reader, count, levels, into, |v| {
-                        of(Value::Unsigned(v.cast_unsigned()))
-                    })
-                }
-                Reader::Int64ColumnReader(reader) => {
-                    append(reader, count, levels, into, |v| of(Value::Whole(v)))
-                }
-                Reader::ByteArrayColumnReader(reader) => {
-                    append(reader, count, levels, into, |v| of(Value::Text(v.data())))
-                }
-                _ => Err(ParquetError::General(
-                    "the column contains neither numbers nor text".into(),
-                )),
-            }
+            }),
+            _ => Err(ParquetError::General(
+                "the column contains no numbers".into(),
+            )),
         })
     }
 
@@ -463,38 +426,27 @@ impl Cursor {
     }
 }
 
-/// Appends rows whose values `of` converts, with `null` for each null.
-fn append<T: DataType, V: Clone>(
+/// Appends rows whose values `of` converts, NaN for each null.
+fn append<T: DataType>(
     reader: &mut ColumnReaderImpl<T>,
     count: usize,
     levels: &mut Vec<i16>,
-    (values, null): (&mut Vec<V>, V),
-    of: impl Fn(T::T) -> V,
+    values: &mut Vec<f64>,
+    of: impl Fn(T::T) -> f64,
 ) -> parquet::errors::Result<usize> {
-    let start = values.len();
     let mut stored = Vec::with_capacity(count);
     let (rows, _, _) = reader.read_records(count, Some(levels), None, &mut stored)?;
-    values.extend(stored.into_iter().map(of));
-    spread(values, start, rows, levels, null);
+    if stored.len() == rows {
+        values.extend(stored.into_iter().map(of));
+        return Ok(rows);
+    }
+    let mut stored = stored.into_iter().map(of);
+    let there = (0..rows).map(|row| levels.get(row).is_some_and(|level| *level > 0));
+    values.extend(there.map(|there| match there {
+        true => stored.next().unwrap_or(f64::NAN),
+        false => f64::NAN,
+    }));
     Ok(rows)
-}
-
-/// Spreads the values from `start` on so that every null among `rows` rows has its place.
-fn spread<T: Clone>(values: &mut Vec<T>, start: usize, rows: usize, levels: &[i16], null: T) {
-    let mut from = values.len();
-    if from - start == rows {
-        return;
-    }
-    values.resize(start + rows, null.clone());
-    // From the back, so that nothing is overwritten before it has moved.
-    for row in (0..rows.min(levels.len())).rev() {
-        if levels[row] > 0 && from > start {
-            from -= 1;
-            values.swap(start + row, from);
-        } else {
-            values[start + row] = null.clone();
-        }
-    }
 }
 
 fn unreadable(error: &ParquetError) -> String {

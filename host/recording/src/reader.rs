@@ -3,13 +3,16 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::batch::Batch;
-use super::columns::{Column, Columns, Layout};
+use super::batch::{Batch, SLICE};
+#[cfg(feature = "parquet")]
+use super::columns::Layout;
+use super::columns::{Column, Columns};
 use super::csv_file::{CsvFile, PIECE};
 use super::digest;
 use super::in_memory::{self, InMemory, PairInMemory};
 use super::manifest::{MANIFEST_FILE, Manifest};
-use super::parquet_file::{ParquetFile, SLICE};
+#[cfg(feature = "parquet")]
+use super::parquet_file::ParquetFile;
 use super::triad_name::{TriadKind, TriadName};
 use super::warning::Warning;
 use crate::error::{Error, Result};
@@ -38,6 +41,7 @@ pub struct Recording {
 #[derive(Debug, Clone)]
 enum Samples {
     Csv(CsvFile),
+    #[cfg(feature = "parquet")]
     Parquet(ParquetFile, Layout),
     InMemory(Arc<dyn InMemory>),
 }
@@ -110,6 +114,9 @@ impl Recording {
                 }
                 (csv, file.layout.clone(), Samples::Csv(file))
             }
+            #[cfg(not(feature = "parquet"))]
+            (false, true) => return Err(super::writer::without_parquet(&parquet)),
+            #[cfg(feature = "parquet")]
             (false, true) => {
                 let file = ParquetFile::open(&parquet)?;
                 let names = file.names();
@@ -215,6 +222,7 @@ impl Recording {
         }
         let source = match &self.source {
             Samples::Csv(file) => Samples::Csv(file.of_pair(number)),
+            #[cfg(feature = "parquet")]
             Samples::Parquet(file, layout) => {
                 Samples::Parquet(file.clone(), layout.of_pair(number))
             }
@@ -241,6 +249,7 @@ impl Recording {
     pub fn rows(&self) -> Option<u64> {
         match &self.source {
             Samples::Csv(_) => None,
+            #[cfg(feature = "parquet")]
             Samples::Parquet(file, _) => Some(file.rows()),
             Samples::InMemory(samples) => Some(samples.rows() as u64),
         }
@@ -284,6 +293,7 @@ impl Recording {
     fn written_columns(&self, columns: &[Column], progress: impl Fn(f64)) -> Result<Vec<Vec<f64>>> {
         match &self.source {
             Samples::Csv(_) => {}
+            #[cfg(feature = "parquet")]
             Samples::Parquet(file, layout) => {
                 let column = |column: &Column| file.column(layout, *column);
                 return columns.iter().map(column).collect();
@@ -328,6 +338,7 @@ impl Recording {
         })
     }
 
+    #[cfg_attr(not(feature = "parquet"), expect(unused_variables))]
     fn in_written_pieces(
         &self,
         piece: usize,
@@ -339,6 +350,7 @@ impl Recording {
             Samples::Csv(file) => digest::while_hashing(&self.samples, || {
                 file.for_each_batch(piece, progress, consume)
             }),
+            #[cfg(feature = "parquet")]
             Samples::Parquet(file, layout) => digest::while_hashing(&self.samples, || {
                 file.for_each_batch(layout, slice, progress, consume)
             }),

@@ -70,15 +70,4 @@ mod tests {
             assert_eq!(corrected(f64::from(wide as i16)), f64::from(right));
         }
     }
-
-    #[test]
-    fn what_is_no_raw_column_is_refused() {
-        for text in ["", "mag", "temp_c", "gyro=2", "gyro_"] {
-            assert!(text.parse::<SignedLowByte>().is_err(), "{text}");
-        }
-        let gyro: SignedLowByte = "gyro".parse().unwrap();
-        let reached: Vec<bool> = (0..6).map(|c| gyro.applies_to(Column::Raw(c))).collect();
-        assert_eq!(reached, [true, true, true, false, false, false]);
-        assert!(!gyro.applies_to(Column::Temperature) && !gyro.applies_to(Column::Reference(0)));
-    }
 }

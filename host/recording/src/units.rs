@@ -429,11 +429,4 @@ mod tests {
         let counts = scaled(&gyro, 7505.7, true);
         assert_eq!(gyro_unit(&counts, &accel, None).unit, Some("count"));
     }
-
-    #[test]
-    fn without_times_no_turn_is_known() {
-        let [mut gyro, accel] = session();
-        gyro.t_s.clear();
-        assert_eq!(rad_per_reading(&gyro, &accel), None);
-    }
 }

@@ -7,6 +7,7 @@ use super::cell::is_reading;
 use super::columns::{Column, Columns};
 use super::csv_writer::CsvWriter;
 use super::manifest::{MANIFEST_FILE, Manifest};
+#[cfg(feature = "parquet")]
 use super::parquet_writer::ParquetWriter;
 use super::staging::Staging;
 use crate::error::{Error, Result};
@@ -61,6 +62,7 @@ pub struct Writer {
 #[derive(Debug)]
 enum Samples {
     Csv(CsvWriter),
+    #[cfg(feature = "parquet")]
     Parquet(Box<ParquetWriter>),
 }
 
@@ -84,6 +86,9 @@ impl Writer {
         let path = staging.path().join(format.file_name());
         let samples = match format {
             SampleFormat::Csv => Samples::Csv(CsvWriter::create(&path, columns)?),
+            #[cfg(not(feature = "parquet"))]
+            SampleFormat::Parquet => return Err(without_parquet(&path)),
+            #[cfg(feature = "parquet")]
             SampleFormat::Parquet => {
                 Samples::Parquet(Box::new(ParquetWriter::create(&path, columns)?))
             }
@@ -130,6 +135,7 @@ impl Writer {
         }
         match &mut self.samples {
             Samples::Csv(writer) => writer.write(batch)?,
+            #[cfg(feature = "parquet")]
             Samples::Parquet(writer) => writer.write(batch)?,
         }
         self.rows += batch.len() as u64;
@@ -155,6 +161,7 @@ impl Writer {
         }
         match self.samples {
             Samples::Csv(writer) => writer.finish()?,
+            #[cfg(feature = "parquet")]
             Samples::Parquet(writer) => writer.finish()?,
         }
         self.staging
@@ -162,4 +169,12 @@ impl Writer {
         self.staging.publish()?;
         Ok(target)
     }
+}
+
+/// The refusal of a Parquet file in a build without the feature.
+#[cfg(not(feature = "parquet"))]
+pub(crate) fn without_parquet(path: &Path) -> Error {
+    let problem = "this program was built without Parquet";
+    let remedy = "build it with the feature `parquet`, or use CSV";
+    Error::new(path.display(), problem, remedy)
 }

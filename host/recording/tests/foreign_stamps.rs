@@ -1,6 +1,6 @@
 //! Time stamps of loggers that lose samples, pause or are slow. The virtual bench gives the true time of each sample.
 
-use mimu_recording::error::{Argument, Error, Result};
+use mimu_recording::error::Result;
 use mimu_recording::{
     Batch, ImportOptions, ImportSummary, RawUnit, Recording, Reference, TimeSummary, import,
 };
@@ -107,27 +107,4 @@ fn a_buffer_that_is_handed_over_in_bursts_is_still_a_steady_stream_without_gaps(
     let (time, _) = log.import(|_| ()).expect("importable");
     assert_eq!((time.gaps, time.stamps_kept), (0, false), "{time:?}");
     assert!((time.rate_hz / 100.0 - 1.0).abs() < 1e-3, "{time:?}");
-}
-
-#[test]
-fn microseconds_of_a_log_at_one_or_two_hertz_are_asked_for_and_not_taken_for_nanoseconds() {
-    for rate_hz in [1.0, 2.0] {
-        let log = Log::new(rate_hz, "stamp_jitter_s = 0.001");
-        let error: Error = log.import(|_| ()).expect_err("it has two readings");
-        assert!(
-            error.refused().arguments.contains(&Argument::TimeUnit),
-            "{error}"
-        );
-        let said = error.to_string();
-        assert!(
-            said.contains("in microseconds") && said.contains("in nanoseconds"),
-            "{said}"
-        );
-        let (time, t_s) = log
-            .import(|options| options.log.time_unit = Some("us".parse().expect("a unit")))
-            .expect("importable");
-        assert!((time.rate_hz / rate_hz - 1.0).abs() < 1e-3, "{time:?}");
-        let lasts = log.taken_s[log.taken_s.len() - 1] - log.taken_s[0];
-        assert!((t_s[t_s.len() - 1] - lasts).abs() < 0.01);
-    }
 }

@@ -10,7 +10,6 @@
 //! | `rails` | readings at the end of a range |
 //! | `zeros` | padding, a sensor that is not connected, sensors in rows of their own |
 //! | `magnitude` | another unit, readings without gravity |
-//! | `two_sources` | rows of two devices or in two units |
 //! | `sixteen_bits` | unsigned codes, overflows, a low byte that was read with a sign |
 //! | `temperatures` | values that are no temperatures, a thermometer that is absent or silent |
 //!
@@ -21,7 +20,6 @@ mod rails;
 mod repeats;
 mod sixteen_bits;
 mod temperatures;
-mod two_sources;
 mod words;
 mod zeros;
 
@@ -34,9 +32,9 @@ pub use repeats::{
     Constant, HeldReadings, Repetition, StuckChannel, Unanswered, channel_run_by_chance, is_coarse,
 };
 pub use sixteen_bits::SignedLowByteFinder;
+pub(crate) use sixteen_bits::across_16_bits;
 pub(crate) use temperatures::impossible_temperature;
 pub use temperatures::{At, Temperatures, unusual_temperatures};
-pub(crate) use two_sources::TwoSources;
 pub use words::Cause;
 pub(crate) use zeros::{RowKind, SENSORS, Zeros};
 
@@ -127,10 +125,6 @@ pub enum Fault {
         unit: &'static str,
         import: &'static str,
     },
-    /// A reading jumps away and returns in the next row, in this share of the rows.
-    Alternating { share: f64 },
-    /// The specific force has one magnitude in some rows and another one in others, of all rows.
-    TwoMagnitudes { low: f64, high: f64, of: u64 },
     /// Negative readings are written as unsigned codes of 16 bits.
     Unsigned,
     /// Signed readings of 16 bits overflow.
@@ -206,8 +200,6 @@ impl Finding {
             Fault::NotSi { .. } => "not_si",
             Fault::Turning { .. } => "turning",
             Fault::NotCounts { .. } => "not_counts",
-            Fault::Alternating { .. } => "alternating",
-            Fault::TwoMagnitudes { .. } => "two_magnitudes",
             Fault::Unsigned => "unsigned",
             Fault::Overflow => "overflow",
             Fault::SignedLowByte => "signed_low_byte",
@@ -242,10 +234,9 @@ impl Finding {
 
     /// Settings of an import that its remedy is about.
     fn settings(&self) -> &'static [Argument] {
-        use Argument::{Columns, Rows, TrustReadings, TwosComplement, Where};
+        use Argument::{Columns, Rows, TrustReadings, TwosComplement};
         match self.fault {
             Fault::AllZero => &[Columns],
-            Fault::Alternating { .. } => &[Where, Columns, TrustReadings],
             Fault::Unsigned => &[TwosComplement, TrustReadings],
             Fault::RangeChanged { .. } | Fault::ColumnsMoved { .. } => &[Rows, TrustReadings],
             Fault::SignedLowByte => &[Argument::SignedLowByte, TrustReadings],

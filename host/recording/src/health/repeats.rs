@@ -368,9 +368,4 @@ mod tests {
         // So that no turn is integrated across it.
         assert_eq!(found(5.0, 12) as u64, PERIODS);
     }
-
-    #[test]
-    fn a_board_with_coarse_steps_repeats_its_readings_without_a_fault() {
-        assert_eq!(found(0.0, 100), 0);
-    }
 }

@@ -130,22 +130,6 @@ mod tests {
     }
 
     #[test]
-    fn it_is_found_in_turns_whose_steps_are_as_long_as_a_byte() {
-        // Turns of a second at 100 Hz, of up to 60 deg/s, with rests between them.
-        let turn = |k: i32| match k % 400 {
-            k @ 0..100 => 3930.0 * (1.0 - (f64::from(k) * 0.02 * std::f64::consts::PI).cos()),
-            _ => 0.0,
-        };
-        let noise = signal(8.0);
-        let turns = (0..4000).zip(&noise);
-        let turns: Vec<f64> = turns
-            .map(|(k, v)| (turn(k) - 580.0 + 0.01 * v).round())
-            .collect();
-        assert!(found(&read(&turns)).is_some());
-        assert_eq!(found(&turns), None);
-    }
-
-    #[test]
     fn sound_readings_are_left_alone_whatever_their_noise() {
         for noise in [2.0, 40.0, 300.0, 3000.0] {
             assert_eq!(found(&signal(noise)), None, "{noise}");

@@ -128,14 +128,6 @@ impl Finding {
             Fault::SeparateRows { gyro, accel } => format!(
                 "{gyro} rows have the gyro alone and {accel} the accelerometer alone, so no turn is complete"
             ),
-            Fault::Alternating { share } => format!(
-                "in {:.0} % of the rows the reading jumps away and returns in the next one: rows of two devices, or readings in two units, alternate",
-                100.0 * share
-            ),
-            Fault::TwoMagnitudes { low, high, of } => format!(
-                "the specific force is about {low:.3} in some rows and about {high:.3} in others, {count} of {of} of them, first in row {}: readings in two units, or of two devices",
-                self.rows.first.unwrap_or_default()
-            ),
             Fault::Unsigned => "negative readings are written as unsigned codes of 16 bits: near 0 they jump to 65535".into(),
             Fault::Overflow => format!(
                 "it jumps {count} times from one end of 16 bits to the other: the firmware's integers overflow, and the sensor's range is too small for this motion, or its factor too large"
@@ -244,10 +236,6 @@ impl Finding {
             Fault::NotSi { cause, .. } => cause.remedy,
             Fault::Turning { .. } => "the unit turns evenly, or the readings are in deg/s",
             Fault::NotCounts { import, .. } => return format!("import them with {import}"),
-            Fault::Alternating { .. } => {
-                "if a column says whose each row is, choose by it, with a list of columns for each; otherwise import the rows of each from a separate file"
-            }
-            Fault::TwoMagnitudes { .. } => "import the rows of each separately",
             Fault::Unsigned => {
                 let column = self.about.unwrap_or_default();
                 return format!("say that they are two's complement: {column}=16");

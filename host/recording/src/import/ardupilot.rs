@@ -159,22 +159,14 @@ impl Log {
                 readings => all.extend(readings?),
             }
         }
-        let kind = TriadKind::Mag;
-        all.extend(
-            (1..=TriadName::MOST)
-                .zip(&self.mags)
-                .map(|(number, (instance, rows))| {
-                    let mut readings = Readings::of_triads([TriadName { kind, number }]);
-                    for (stamp_ns, values) in rows {
-                        readings.push(*stamp_ns, *values);
-                    }
-                    let count = rows.len();
-                    readings.notes.push(format!(
+        let mags = (1..=TriadName::MOST).zip(&self.mags);
+        all.extend(mags.map(|(number, (instance, rows))| {
+            let count = rows.len();
+            let note = format!(
                 "{count} messages {MAG} of instance {instance}, after ArduPilot's calibration"
-            ));
-                    readings.sorted()
-                }),
-        );
+            );
+            Readings::of_mag(number, rows.iter().copied(), note)
+        }));
         Ok(all)
     }
 

@@ -159,7 +159,7 @@ pub(crate) enum Unreadable {
 /// A row that cannot be read.
 #[derive(Debug)]
 pub(crate) struct BrokenRow {
-    number: u64,
+    pub number: u64,
     fault: Fault,
     error: Error,
 }

@@ -76,26 +76,3 @@ impl From<Option<Separator>> for TextFormat {
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn signs_are_read_and_printed_alike_and_begin_comments() {
-        for text in ["#%", "#;", "!", "none"] {
-            assert_eq!(text.parse::<CommentSigns>().unwrap().to_string(), text);
-        }
-        let default = CommentSigns::default();
-        assert_eq!(default.begins(b"  % x"), Some(b'%'));
-        assert_eq!(default.skipped(b"## t, x"), b"t, x");
-        let none: CommentSigns = "none".parse().unwrap();
-        assert_eq!(
-            (none.begins(b"# x"), none.skipped(b" # x")),
-            (None, &b"# x"[..])
-        );
-        for text in ["", "a", "-", "#1"] {
-            assert!(text.parse::<CommentSigns>().is_err(), "{text}");
-        }
-    }
-}

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use super::joined::JoinedFiles;
-use super::left_out::LeftOut;
+use super::broken::Unreadable;
+use super::joined::Files;
 use super::options::ImportOptions;
-use super::row::Row;
+use super::table::{Cells, Table};
 use crate::columns::Column;
 use crate::csv_writer::write_number;
 use crate::error::{Error, Result};
@@ -34,7 +34,10 @@ impl ReplacedTriad {
 /// The rows that an import of one text file reads, with all of their columns, to be written as CSV with other readings. Lines without a row and rows that
 /// the import leaves out are not copied.
 pub struct CopiedTable {
-    import: JoinedFiles,
+    table: Table,
+    cells: Cells,
+    /// Lines of the rows that the import takes.
+    numbers: std::vec::IntoIter<u64>,
     replaced: Vec<ReplacedTriad>,
     csv: csv::Writer<Vec<u8>>,
 }
@@ -53,13 +56,15 @@ impl CopiedTable {
         if options.sources() != 1 || options.log.means || options.is_sequence() {
             return refuse("only a single file is copied");
         }
-        let import = JoinedFiles::open(options, LeftOut::default())?;
-        if import.interpolates() {
+        let files = Files::read(options, &|_| {})?;
+        if files.interpolates() {
             return refuse("its times are irregular, so its rows are interpolated");
         }
-        let Some(table) = import.first.text() else {
+        if !files.first.is_text {
             return refuse("only text is copied");
-        };
+        }
+        let how = options.how(0);
+        let table = Table::open(path, how.list, how.log.text_format(), &how.filters)?;
         let name = |(k, (name, column)): (usize, (String, Option<Column>))| match column {
             Some(column) if of(&replaced, column).is_some() => {
                 let ending = of(&replaced, column).map_or("", ReplacedTriad::ending);
@@ -75,7 +80,9 @@ impl CopiedTable {
         csv.write_record(&names)
             .map_err(|e| Error::new(path.display(), e, "copy it elsewhere"))?;
         Ok(Self {
-            import,
+            table,
+            cells: Cells::default(),
+            numbers: files.first.numbers.into_iter(),
             replaced,
             csv,
         })
@@ -86,8 +93,6 @@ impl CopiedTable {
     /// # Errors
     /// The file has no further row: it has changed since it was imported.
     pub fn row(&mut self, readings: impl Fn(Column) -> f64) -> Result<()> {
-        let file = &mut self.import.first;
-        let mut row = Row::default();
         let ended = || {
             Error::new(
                 "copy",
@@ -95,11 +100,17 @@ impl CopiedTable {
                 "run it again",
             )
         };
-        if !file.next(&mut row)? {
-            return Err(ended());
+        let wanted = self.numbers.next().ok_or_else(ended)?;
+        loop {
+            match self.table.next(&mut self.cells) {
+                Ok(Some(number)) if number == wanted => break,
+                // Rows that the import leaves out.
+                Ok(Some(_)) | Err(Unreadable::Row(_)) => {}
+                Ok(None) => return Err(ended()),
+                Err(Unreadable::File(error)) => return Err(error),
+            }
         }
-        let table = file.text().ok_or_else(ended)?;
-        let replaced = table.all_cells().map(|(cell, column)| match column {
+        let replaced = self.table.all_cells().map(|(cell, column)| match column {
             Some(column) if of(&self.replaced, column).is_some() => {
                 let mut text = Vec::new();
                 write_number(readings(column), &mut text);

@@ -7,21 +7,25 @@
 //! Source: docs.gyroflow.xyz, "gcsv format" 1.3; telemetry-parser 0.2.6, src/gyroflow/mod.rs, which reads the same names and defaults.
 
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::{BufRead, BufReader};
 use std::path::Path;
 
+use super::assignment::{ColumnList, Role};
+use super::broken::{BrokenRow, Unreadable};
 use super::decimal::Decimal;
+use super::head;
+use super::header::HEAD;
 use super::readings::{Choice, LogFormat, Readings};
+use super::table::{Cells, Table};
+use crate::columns::Column;
 use crate::error::{Argument, Error, Result};
+use crate::separator::Separator;
 use crate::triad_name::TriadName;
+use crate::units::STANDARD_GRAVITY;
 
 /// First lines of the format, the second without a maker's name.
 const TITLES: [&str; 2] = ["GYROFLOW IMU LOG", "CAMERA IMU LOG"];
 /// Factor of the stamps where the header has none, s.
 const TSCALE: f64 = 1e-3;
-/// What the format calls g.
-const GRAVITY: f64 = 9.80665;
 /// Gauss in µT.
 const GAUSS_UT: f64 = 100.0;
 /// Columns after the time. The accelerometer or the magnetometer may be missing.
@@ -37,170 +41,148 @@ pub(super) const GCSV: LogFormat = LogFormat {
 
 /// Reads a log.
 fn read(path: &Path, choice: Choice<'_>) -> Result<Vec<Readings>> {
-    if choice.topics.is_empty() && choice.instance.is_none() {
-        let file = File::open(path).map_err(|error| Error::io(path, &error))?;
-        return Ok(vec![Log::read(path, BufReader::new(file))?]);
+    if !choice.topics.is_empty() || choice.instance.is_some() {
+        let problem = "a log of Gyroflow has one sensor and no topics";
+        return Err(Error::new(path.display(), problem, "leave the choice out")
+            .about(Argument::Topic)
+            .about(Argument::Instance));
     }
-    let problem = "a log of Gyroflow has one sensor and no topics";
-    Err(Error::new(path.display(), problem, "leave the choice out")
-        .about(Argument::Topic)
-        .about(Argument::Instance))
-}
-
-struct Log {
-    readings: Readings,
-    /// Factor of the stamps, s.
-    tscale: f64,
-    /// Factors of the readings, SI and µT.
-    scales: Vec<f64>,
-    /// How many of them are of gyro and accelerometer. A slower magnetometer may have empty cells.
-    inertial: usize,
-    /// Rows without a number for each column, and the first of them, counted from the first line of the file.
-    broken: Option<(u64, u64)>,
-}
-
-impl Log {
-    fn read(path: &Path, file: impl BufRead) -> Result<Readings> {
-        let (mut header, mut log) = (BTreeMap::new(), None);
-        for (line, number) in file.split(b'\n').zip(1_u64..) {
-            let line = line.map_err(|error| Error::io(path, &error))?;
-            let line = String::from_utf8_lossy(&line);
-            let cells: Vec<&str> = line.split(',').map(str::trim).collect();
-            match &mut log {
-                _ if cells == [""] => {}
-                None if number == 1 => check_title(path, cells[0])?,
-                None if ["t", "time"].contains(&cells[0]) => {
-                    log = Some(Self::with_header(path, &header, &cells)?)
-                }
-                None => {
-                    if let [key, value] = cells.as_slice() {
-                        header.insert((*key).to_owned(), (*value).to_owned());
-                    }
-                }
-                Some(log) => log.take(&cells, number),
+    let header = Header::read(path)?;
+    let (tscale, triads) = (header.number("tscale")?.unwrap_or(TSCALE), header.triads()?);
+    let named = |(triad, _): &(TriadName, f64)| [0, 1, 2].map(|axis| Column::of(*triad, axis));
+    let columns = [Column::Time]
+        .into_iter()
+        .chain(triads.iter().flat_map(named));
+    let list = columns.map(Role::Column).zip(header.names.iter().cloned());
+    let list = ColumnList::ByName(list.collect());
+    let mut table = Table::open(path, Some(&list), Some(Separator::Comma).into(), &[])?;
+    let mut readings = Readings::of_triads(triads.iter().map(|(triad, _)| *triad));
+    // A slower magnetometer may have empty cells.
+    let inertial = triads
+        .iter()
+        .filter(|(triad, _)| *triad != TriadName::MAG)
+        .count();
+    let (mut cells, mut broken) = (Cells::default(), None);
+    loop {
+        match table.next(&mut cells) {
+            Ok(None) => break,
+            Ok(Some(_)) if cells.numbers[..=3 * inertial].iter().all(|v| v.is_finite()) => {
+                let scaled = cells.numbers[1..]
+                    .iter()
+                    .zip(triads.iter().flat_map(|(_, f)| [f; 3]));
+                let stamp_ns = (cells.numbers[0] * tscale * 1e9).round() as i64;
+                readings.push(stamp_ns, scaled.map(|(value, factor)| value * factor));
+            }
+            Err(Unreadable::File(error)) => return Err(error),
+            Ok(Some(row)) | Err(Unreadable::Row(BrokenRow { number: row, .. })) => {
+                broken.get_or_insert((0, row)).0 += 1;
             }
         }
-        let Some(mut log) = log else {
-            let problem = "it has no line with the names of the columns, t,gx,gy,gz and so on";
-            return Err(Error::new(
-                path.display(),
-                problem,
-                "log again: the file is cut",
-            ));
-        };
-        if let Some((rows, first)) = log.broken {
-            log.readings.warnings.push(format!("{rows} rows without a number in each column were skipped, the first in line {first}"));
+    }
+    let text = |key: &str| header.values.get(key).map_or("none", String::as_str);
+    readings.notes.push(format!(
+        "log of Gyroflow by {}; axes are those of its sensor, before Gyroflow's orientation ({})",
+        text("id"),
+        text("orientation")
+    ));
+    if !triads.iter().any(|(triad, _)| *triad == TriadName::ACCEL) {
+        readings
+            .warnings
+            .push("the log has no accelerometer".into());
+    }
+    if let Some((rows, first)) = broken {
+        readings.warnings.push(format!(
+            "{rows} rows without a number in each column were skipped, the first in line {first}"
+        ));
+    }
+    Ok(vec![readings])
+}
+
+/// The lines above the rows.
+struct Header<'a> {
+    path: &'a Path,
+    values: BTreeMap<String, String>,
+    names: Vec<String>,
+}
+
+impl<'a> Header<'a> {
+    fn read(path: &'a Path) -> Result<Self> {
+        let refuse =
+            |problem: String, remedy: &str| Err(Error::new(path.display(), problem, remedy));
+        let (head, _) = head::open(path, HEAD)?;
+        let text = String::from_utf8_lossy(&head);
+        let mut lines = text
+            .lines()
+            .map(|line| line.split(',').map(str::trim).collect::<Vec<_>>());
+        if !lines.next().is_some_and(|title| TITLES.contains(&title[0])) {
+            let remedy = "give a log of Gyroflow, or rename the file to .csv and name its columns";
+            return refuse(format!("it does not begin with {}", TITLES[0]), remedy);
         }
-        Ok(log.readings)
+        let mut values = BTreeMap::new();
+        for cells in lines {
+            match cells.as_slice() {
+                ["t" | "time", names @ ..] if names.starts_with(&NAMES[..3]) => {
+                    let names = cells.into_iter().map(str::to_owned).collect();
+                    return Ok(Self {
+                        path,
+                        values,
+                        names,
+                    });
+                }
+                ["t" | "time", ..] => {
+                    let problem = format!(
+                        "its columns are {}, but a log of Gyroflow begins with t,gx,gy,gz",
+                        cells.join(",")
+                    );
+                    return refuse(problem, "rename the file to .csv, and name its columns");
+                }
+                [key, value] => drop(values.insert((*key).to_owned(), (*value).to_owned())),
+                _ => {}
+            }
+        }
+        let problem = "it has no line with the names of the columns, t,gx,gy,gz and so on";
+        refuse(problem.into(), "log again: the file is cut")
     }
 
-    fn with_header(path: &Path, header: &BTreeMap<String, String>, names: &[&str]) -> Result<Self> {
-        let has_accel = names.get(4..7) == Some(&NAMES[3..6]);
-        if names.get(1..4) != Some(&NAMES[..3]) {
-            let problem = format!(
-                "its columns are {}, but a log of Gyroflow begins with t,gx,gy,gz",
-                names.join(",")
-            );
-            return Err(Error::new(
-                path.display(),
-                problem,
-                "rename the file to .csv, and name its columns",
-            ));
-        }
-        let number = |key: &str| -> Result<Option<f64>> {
-            let Some(text) = header.get(key) else {
-                return Ok(None);
-            };
-            match text.parse() {
-                Ok(value) if f64::is_finite(value) && value != 0.0 => Ok(Some(value)),
-                _ => Err(Error::new(
-                    path.display(),
-                    format!("{key} of its header is {text:?}, not a number"),
-                    "correct this line of the file",
-                )),
-            }
+    /// The number of a line.
+    fn number(&self, key: &str) -> Result<Option<f64>> {
+        let Some(text) = self.values.get(key) else {
+            return Ok(None);
         };
-        let factor = |key: &str, unit: &str| {
-            number(key)?.ok_or_else(|| {
-                let problem = format!("its header has no {key}, so its readings have no unit");
-                Error::new(
-                    path.display(),
+        match text.parse() {
+            Ok(value) if f64::is_finite(value) && value != 0.0 => Ok(Some(value)),
+            _ => {
+                let problem = format!("{key} of its header is {text:?}, not a number");
+                Err(Error::new(
+                    self.path.display(),
                     problem,
-                    format!("add a line `{key},FACTOR` to the header: {unit} per count"),
-                )
+                    "correct this line of the file",
+                ))
+            }
+        }
+    }
+
+    /// The triads of the log in the order of the columns, with their factors to SI and µT.
+    fn triads(&self) -> Result<Vec<(TriadName, f64)>> {
+        let factor = |key: &str, unit: &str| {
+            self.number(key)?.ok_or_else(|| {
+                let problem = format!("its header has no {key}, so its readings have no unit");
+                let remedy = format!("add a line `{key},FACTOR` to the header: {unit} per count");
+                Error::new(self.path.display(), problem, remedy)
             })
         };
-        let gyro = factor("gscale", "rad/s")?;
-        let mut scales = vec![gyro; 3];
-        if has_accel {
-            scales.extend([factor("ascale", "g")? * GRAVITY; 3]);
+        let has = |count: usize| self.names[1..].iter().take(count).eq(&NAMES[..count]);
+        let mut triads = vec![(TriadName::GYRO, factor("gscale", "rad/s")?)];
+        if has(6) {
+            triads.push((TriadName::ACCEL, factor("ascale", "g")? * STANDARD_GRAVITY));
         }
-        let inertial = scales.len();
-        let mut triads = vec![TriadName::GYRO];
-        triads.extend(has_accel.then_some(TriadName::ACCEL));
-        if has_accel
-            && names.get(7..10) == Some(&NAMES[6..])
-            && let Some(gauss) = number("mscale")?
+        if has(9)
+            && let Some(gauss) = self.number("mscale")?
         {
-            scales.extend([gauss * GAUSS_UT; 3]);
-            triads.push(TriadName::MAG);
+            triads.push((TriadName::MAG, gauss * GAUSS_UT));
         }
-        let mut readings = Readings::of_triads(triads);
-        let text = |key: &str| header.get(key).map_or("none", String::as_str);
-        readings.notes.push(format!(
-            "log of Gyroflow by {}; axes are those of its sensor, before Gyroflow's orientation ({})",
-            text("id"),
-            text("orientation")
-        ));
-        if !has_accel {
-            readings
-                .warnings
-                .push("the log has no accelerometer".into());
-        }
-        Ok(Self {
-            readings,
-            tscale: number("tscale")?.unwrap_or(TSCALE),
-            scales,
-            inertial,
-            broken: None,
-        })
+        Ok(triads)
     }
-
-    fn take(&mut self, cells: &[&str], line: u64) {
-        let number = |cell: &&str| {
-            fast_float2::parse::<f64, _>(cell.as_bytes())
-                .ok()
-                .filter(|v| v.is_finite())
-        };
-        let numbers: Option<Vec<f64>> = cells.iter().take(1 + self.inertial).map(number).collect();
-        match numbers {
-            Some(mut numbers) if numbers.len() == 1 + self.inertial => {
-                let further = 1 + self.inertial..1 + self.scales.len();
-                let cell = |at: usize| cells.get(at).and_then(number).unwrap_or(f64::NAN);
-                numbers.extend(further.map(cell));
-                let stamp_ns = (numbers[0] * self.tscale * 1e9).round() as i64;
-                let values = numbers[1..].iter().zip(&self.scales);
-                self.readings
-                    .push(stamp_ns, values.map(|(value, scale)| value * scale));
-            }
-            _ => {
-                let (rows, first) = self.broken.unwrap_or((0, line));
-                self.broken = Some((rows + 1, first));
-            }
-        }
-    }
-}
-
-fn check_title(path: &Path, title: &str) -> Result<()> {
-    if TITLES.contains(&title.trim_start_matches('\u{feff}')) {
-        return Ok(());
-    }
-    let problem = format!("it does not begin with {}", TITLES[0]);
-    Err(Error::new(
-        path.display(),
-        problem,
-        "give a log of Gyroflow, or rename the file to .csv and name its columns",
-    ))
 }
 
 #[cfg(test)]

@@ -9,7 +9,6 @@ use super::row_filter::{RowFilter, RowFilters};
 use crate::cell::{Refusal, shorten};
 use crate::columns::Column;
 use crate::error::{Argument, Error, Result};
-use crate::separator::Separator;
 
 /// Bytes at the start of a text file within which the data must begin.
 pub(super) const HEAD: u64 = 1 << 18;
@@ -39,32 +38,6 @@ struct Misfit {
     data: bool,
 }
 
-/// What the lines before the first row have shown.
-#[derive(Default)]
-struct Search {
-    /// The names in the line that is nearest to the wanted header.
-    names: Vec<String>,
-    misfit: Option<Misfit>,
-    /// Line of the first row that the filters leave out. Such rows may come first, and have another width.
-    left_out: Option<u64>,
-}
-
-impl Search {
-    /// Keeps the names of a line if they are nearer to the wanted header.
-    fn compare(&mut self, here: Vec<String>, list: Option<&ColumnList>) {
-        if self.names.is_empty() || matches(list, &here) > matches(list, &self.names) {
-            self.names = here;
-        }
-    }
-
-    fn report(&mut self, misfit: Misfit) {
-        let data = misfit.data;
-        if self.misfit.as_ref().is_none_or(|first| data && !first.data) {
-            self.misfit = Some(misfit);
-        }
-    }
-}
-
 impl Header {
     fn new(path: &Path, format: LineFormat, filters: &[RowFilter]) -> Self {
         Self {
@@ -79,6 +52,7 @@ impl Header {
     }
 
     /// The columns of a table whose `names` are known. Without `list` they must be those of a recording.
+    #[cfg(feature = "parquet")]
     pub fn of_names(
         path: &Path,
         names: Vec<String>,
@@ -87,7 +61,7 @@ impl Header {
         noticed: &mut Noticed,
     ) -> Result<Self> {
         let format = LineFormat {
-            separator: Separator::Comma,
+            separator: crate::separator::Separator::Comma,
             comments: Default::default(),
         };
         let mut header = Self::new(path, format, filters);
@@ -131,8 +105,69 @@ impl Header {
         let position = |filter| header.position(filter, lines);
         header.filtered = filters.iter().map(position).collect::<Result<_>>()?;
         header.take_list(list);
-        let first_row = header.first_row(lines, list, noticed)?;
-        Ok((header, first_row))
+        let mut record = csv::ByteRecord::new();
+        let (mut met, mut misfit) = (Vec::new(), None::<Misfit>);
+        // The first row that the filters leave out. Such rows may come first, and have another width.
+        let mut left_out = None;
+        for (number, line) in (1..).zip(lines) {
+            let kind = format.kind(line);
+            match kind {
+                // Counted when the rows are read.
+                Kind::Blank | Kind::Comment if left_out.is_some() => continue,
+                Kind::Blank => {
+                    // The text after the last line break is not a line.
+                    noticed.skipped.blank += u64::from(number < lines.len() as u64);
+                    continue;
+                }
+                Kind::Comment => format.split_header(line, &mut record),
+                Kind::Other => format.split(line, &mut record),
+            }
+            let names = texts(&record);
+            let comment = matches!(kind, Kind::Comment);
+            if header.wanted.is_empty() {
+                header.take_names(&names, list, &header.place(number), noticed)?;
+                match comment && header.wanted.is_empty() {
+                    true => noticed.skipped.comment += 1,
+                    false => noticed.skipped.header += 1,
+                }
+                met.extend(names);
+                continue;
+            }
+            if comment {
+                noticed.skipped.comment += 1;
+                if names.len() == header.width {
+                    header.names = names;
+                }
+                continue;
+            }
+            let data = format.mostly_numbers(record.iter());
+            if data && !header.filters.hold(&header.filtered, &record) {
+                left_out.get_or_insert(number);
+                continue;
+            }
+            let problem = match header.misfit(&record, true) {
+                Some(refusal) => refusal.problem,
+                None if header.is_row(&record) => {
+                    return Ok((header, left_out.unwrap_or(number)));
+                }
+                None => {
+                    header.names = names;
+                    "it contains words".to_owned()
+                }
+            };
+            if misfit.as_ref().is_none_or(|first| data && !first.data) {
+                misfit = Some(Misfit {
+                    number,
+                    problem,
+                    data,
+                });
+            }
+            noticed.skipped.header += u64::from(left_out.is_none());
+        }
+        match (left_out, misfit) {
+            (Some(number), None) => Ok((header, number)),
+            (_, misfit) => Err(header.no_row(lines, list, &met, misfit)),
+        }
     }
 
     /// Roles in the order of [`Cells::numbers`](super::table::Cells::numbers).
@@ -141,6 +176,7 @@ impl Header {
     }
 
     /// Positions of the cells that are read.
+    #[cfg(feature = "parquet")]
     pub fn positions(&self) -> impl Iterator<Item = usize> {
         let wanted = self.wanted.iter().map(|(at, _)| at);
         wanted.chain(&self.filtered).copied()
@@ -235,133 +271,65 @@ impl Header {
         }
     }
 
-    /// The line of the first row among `lines`. If columns are chosen by name, finds the header above it.
-    fn first_row(
-        &mut self,
+    /// Why no line of `lines` is a row; `met` are the cells of those that might be a header.
+    fn no_row(
+        &self,
         lines: &[&[u8]],
         list: Option<&ColumnList>,
-        noticed: &mut Noticed,
-    ) -> Result<u64> {
-        let mut search = Search::default();
-        let mut record = csv::ByteRecord::new();
-        for (index, line) in lines.iter().enumerate() {
-            let number = index as u64 + 1;
-            match self.format.kind(line) {
-                // Counted when the rows are read.
-                Kind::Blank | Kind::Comment if search.left_out.is_some() => {}
-                // The text after the last line break is not a line.
-                Kind::Blank => noticed.skipped.blank += u64::from(index + 1 < lines.len()),
-                Kind::Comment => {
-                    self.format.split_header(line, &mut record);
-                    self.take_comment(&record, list, number, noticed)?;
-                }
-                Kind::Other => {
-                    self.format.split(line, &mut record);
-                    if self.take_line(&record, list, number, &mut search, noticed)? {
-                        return Ok(search.left_out.unwrap_or(number));
-                    }
-                }
-            }
-        }
-        match (search.left_out, &search.misfit) {
-            (Some(number), None) => Ok(number),
-            _ => Err(self.no_row(lines, list, search)),
-        }
-    }
-
-    /// Takes the names in a comment above the first row, and counts its line.
-    fn take_comment(
-        &mut self,
-        record: &csv::ByteRecord,
-        list: Option<&ColumnList>,
-        number: u64,
-        noticed: &mut Noticed,
-    ) -> Result<()> {
-        let open = self.wanted.is_empty();
-        if open {
-            self.take_names(&texts(record), list, &self.place(number), noticed)?;
-        } else if record.len() == self.width {
-            self.names = texts(record);
-        }
-        match open && !self.wanted.is_empty() {
-            true => noticed.skipped.header += 1,
-            false => noticed.skipped.comment += 1,
-        }
-        Ok(())
-    }
-
-    /// Takes a line as the header or as a row, or notes in `search` what else it is. Returns whether it is the first row that the filters keep.
-    fn take_line(
-        &mut self,
-        record: &csv::ByteRecord,
-        list: Option<&ColumnList>,
-        number: u64,
-        search: &mut Search,
-        noticed: &mut Noticed,
-    ) -> Result<bool> {
-        let data = self.format.mostly_numbers(record.iter());
-        if self.wanted.is_empty() {
-            let here = texts(record);
-            self.take_names(&here, list, &self.place(number), noticed)?;
-            search.compare(here, list);
-        } else if data && !self.filters.hold(&self.filtered, record) {
-            search.left_out.get_or_insert(number);
-            return Ok(false);
-        } else {
-            let problem = match self.misfit(record, true) {
-                Some(refusal) => refusal.problem,
-                None if self.is_row(record) => return Ok(true),
-                None => {
-                    self.names = texts(record);
-                    "it contains words".to_owned()
-                }
-            };
-            search.report(Misfit {
-                number,
-                problem,
-                data,
-            });
-        }
-        noticed.skipped.header += u64::from(search.left_out.is_none());
-        Ok(false)
-    }
-
-    /// Why no line of `lines` is a row.
-    fn no_row(&self, lines: &[&[u8]], list: Option<&ColumnList>, search: Search) -> Error {
-        if self.wanted.is_empty() {
-            let error = self.no_header(list, &search.names);
-            return self.all_comments(lines).unwrap_or(error);
-        }
-        match search.misfit {
-            Some(Misfit {
-                number, problem, ..
-            }) => Error::new(
+        met: &[String],
+        misfit: Option<Misfit>,
+    ) -> Error {
+        let path = self.path.display();
+        if let Some(Misfit {
+            number, problem, ..
+        }) = misfit
+        {
+            let (width, separator) = (self.width, self.format.separator);
+            let problem = format!(
+                "no row fits the list of {width} columns ({problem}; separator: {separator})"
+            );
+            return Error::new(
                 self.place(number),
-                format!(
-                    "no row fits the list of {} columns ({problem}; separator: {})",
-                    self.width, self.format.separator
-                ),
+                problem,
                 "name every column, - for one to skip",
             )
             .about(Argument::Columns)
-            .about(Argument::Separator),
-            None => self.all_comments(lines).unwrap_or_else(|| {
-                let problem = "the file has no row of data";
-                Error::new(self.path.display(), problem, "record it again")
-            }),
+            .about(Argument::Separator);
         }
+        let mut filled = lines
+            .iter()
+            .filter(|line| !line.trim_ascii().is_empty())
+            .peekable();
+        let digits = |line: &&&[u8]| line.iter().any(u8::is_ascii_digit);
+        let signs = |line: &&[u8]| self.format.comments.begins(line);
+        if let Some(sign) = filled.peek().and_then(|line| signs(line))
+            && filled.clone().all(|line| signs(line).is_some())
+            && 2 * filled.clone().filter(digits).count() >= filled.clone().count()
+        {
+            let (sign, count) = (char::from(sign), filled.count());
+            let problem = format!(
+                "all of its first {count} lines begin with {sign} or such characters, and are taken as comments"
+            );
+            let remedy =
+                "if they contain the readings, say that no character begins a comment: none";
+            return Error::new(path, problem, remedy).about(Argument::Comment);
+        }
+        if self.wanted.is_empty() {
+            return self.no_header(list, met);
+        }
+        Error::new(path, "the file has no row of data", "record it again")
     }
 
-    /// The refusal of a file without a header with the wanted columns; `names` are in the line that is nearest to it.
-    fn no_header(&self, list: Option<&ColumnList>, names: &[String]) -> Error {
+    /// The refusal of a file without a header with the wanted columns; `met` are the names that it may have.
+    fn no_header(&self, list: Option<&ColumnList>, met: &[String]) -> Error {
         let (problem, remedy) = match list {
             None => (
                 "no header has the names of a recording's columns".to_owned(),
                 "name the columns",
             ),
             Some(ColumnList::ByName(wanted)) => {
-                let missing = |(_, name): &&(Role, String)| !names.contains(name);
-                let name = wanted.iter().find(missing).map_or("", |(_, name)| name);
+                let missing = wanted.iter().find(|(_, name)| !met.contains(name));
+                let name = missing.or(wanted.first()).map_or("", |(_, name)| name);
                 let name = shorten(name.as_bytes());
                 (
                     format!("no header has the column {name}"),
@@ -376,37 +344,6 @@ impl Header {
         Error::new(self.path.display(), problem, remedy).about(Argument::Columns)
     }
 
-    /// The refusal of a file whose lines are all comments, of which most contain numbers.
-    fn all_comments(&self, lines: &[&[u8]]) -> Option<Error> {
-        let filled = lines.iter().filter(|line| !line.trim_ascii().is_empty());
-        let signs: Option<Vec<u8>> = filled
-            .map(|line| self.format.comments.begins(line))
-            .collect();
-        let signs = signs.filter(|signs| !signs.is_empty())?;
-        let digits = |line: &&&[u8]| line.iter().any(u8::is_ascii_digit);
-        if 2 * lines.iter().filter(digits).count() < signs.len() {
-            return None;
-        }
-        let (sign, count) = (char::from(signs[0]), signs.len());
-        let first = match std::fs::metadata(&self.path).is_ok_and(|file| file.len() > HEAD) {
-            true => "its first",
-            false => "its",
-        };
-        let problem = match signs.iter().all(|other| *other == signs[0]) {
-            true => {
-                format!("all of {first} {count} lines begin with {sign}, and are taken as comments")
-            }
-            false => {
-                format!(
-                    "all of {first} {count} lines are taken as comments, by their first characters"
-                )
-            }
-        };
-        let remedy = "if they contain the readings, say that no character begins a comment: none";
-        let place = self.path.display();
-        Some(Error::new(place, problem, remedy).about(Argument::Comment))
-    }
-
     /// Takes a line at `place` as the header if it has the wanted names.
     fn take_names(
         &mut self,
@@ -419,35 +356,26 @@ impl Header {
             Some(ColumnList::ByPosition(_)) => return Ok(()),
             Some(ColumnList::ByName(wanted)) => wanted.clone(),
             None => {
-                let known = Role::all().map(|role| (role, role.name().to_owned()));
-                let mut here: Vec<(Role, String)> =
-                    known.filter(|(_, name)| names.contains(name)).collect();
-                for name in names {
-                    let column = Column::from_name(name);
-                    let further = column.filter(|c| matches!(c, Column::More(..)));
-                    let new = further.filter(|_| here.iter().all(|(_, known)| known != name));
-                    here.extend(new.map(|column| (Role::Column(column), name.clone())));
-                }
-                let sensor = |(role, _): &&(Role, String)| match role {
+                let filled = || names.iter().filter(|name| !name.is_empty());
+                let known = filled().filter_map(|n| Some((Role::from_name(n)?, n.clone())));
+                let known: Vec<(Role, String)> = known.collect();
+                let sensor = |(role, _): &(Role, String)| match role {
                     Role::Column(column) => {
                         column.triad().is_some() || *column == Column::Temperature
                     }
                     _ => false,
                 };
-                if here.iter().find(sensor).is_none() {
+                if !known.iter().any(sensor) {
                     return Ok(());
                 }
-                let ignored: Vec<&str> = names
-                    .iter()
-                    .filter(|name| !name.is_empty() && here.iter().all(|(_, known)| known != *name))
-                    .map(String::as_str)
-                    .collect();
+                let ignored = filled().filter(|name| Role::from_name(name).is_none());
+                let ignored: Vec<&str> = ignored.map(String::as_str).collect();
                 if !ignored.is_empty() {
                     let ignored = shorten(ignored.join(", ").as_bytes());
                     let warning = format!("{place}: columns {ignored} are ignored");
                     noticed.warnings.push(warning);
                 }
-                here
+                known
             }
         };
         let mut positions = Vec::new();
@@ -479,16 +407,5 @@ impl Header {
             .filter(|(_, role)| *role != Role::Column(Column::Step));
         self.format
             .mostly_numbers(numbers.map(|(position, _)| &record[*position]))
-    }
-}
-
-/// Number of the wanted names that are among `names`.
-fn matches(list: Option<&ColumnList>, names: &[String]) -> usize {
-    match list {
-        Some(ColumnList::ByName(wanted)) => {
-            let here = wanted.iter().filter(|(_, name)| names.contains(name));
-            here.count()
-        }
-        _ => 0,
     }
 }

@@ -1,8 +1,7 @@
 //! Joining a later file onto the times of the first one.
 
-use super::foreign::ForeignFile;
-use super::row::Row;
-use crate::error::{Error, Result};
+use super::source::Source;
+use super::time::Times;
 
 /// Two stamps nearer than this part of a sample period are the same instant.
 const SAME: f64 = 0.1;
@@ -23,114 +22,56 @@ pub(super) enum Joined {
     Gap,
 }
 
-/// A file that is read along with the first one.
-#[derive(Debug)]
-pub(super) struct Follower {
-    pub file: ForeignFile,
-    tolerance_s: f64,
-    longest_gap_s: f64,
-    /// Last row at or before the instant that was asked for.
-    before: Option<Row>,
-    /// First row after it.
-    after: Option<Row>,
-    spare: Row,
-    started: bool,
-    last_t_s: f64,
-}
-
-impl Follower {
-    /// Follows a file whose rows are `first_period_s` apart; its own rows are `period_s` apart.
-    pub fn new(file: ForeignFile, period_s: f64, first_period_s: f64) -> Follower {
-        Follower {
-            file,
-            tolerance_s: SAME * period_s.min(first_period_s),
-            // A hair more, as stamps are rounded.
-            longest_gap_s: LONGEST_GAP * period_s * (1.0 + 1e-6),
-            before: None,
-            after: None,
-            spare: Row::default(),
-            started: false,
-            last_t_s: f64::NEG_INFINITY,
+/// The values of `source` at the times `t_s` of the first file, whose rows are `first_period_s` apart, and how they were found; not a number where there
+/// are none. For these no row is dropped if they are of further triads: a magnetometer must not cost readings of gyro and accelerometer.
+///
+/// A logger may write a slow sensor's last reading again in each row. Such readings are kept: without the sensor's own stamps a repeated one cannot be
+/// distinguished from a new one of the same value.
+pub(super) fn joined(
+    source: &Source,
+    t_s: &[f64],
+    first_period_s: f64,
+) -> (Vec<Vec<f64>>, Vec<Joined>) {
+    let period_s = source
+        .times
+        .as_ref()
+        .map_or(first_period_s, Times::period_s);
+    let tolerance_s = SAME * period_s.min(first_period_s);
+    // A hair more, as stamps are rounded.
+    let longest_gap_s = LONGEST_GAP * period_s * (1.0 + 1e-6);
+    let (own, mut after) = (&source.t_s, 0);
+    let place = |t: &f64| {
+        while own.get(after).is_some_and(|later| later <= t) {
+            after += 1;
         }
-    }
-
-    /// Appends this file's values at time `t_s` to `values` like [`Self::values_at`]. Where a file of further triads has none, its cells are empty, and no
-    /// row is dropped for them: a magnetometer must not cost readings of gyro and accelerometer.
-    ///
-    /// A logger may write a slow sensor's last reading again in each row. Such readings are kept: without the sensor's own stamps a repeated one cannot be
-    /// told from a new one of the same value.
-    pub fn append_at(&mut self, t_s: f64, values: &mut Vec<f64>) -> Result<Joined> {
-        let joined = self.values_at(t_s, values)?;
-        if !self.file.is_further() {
-            return Ok(joined);
-        }
-        if matches!(joined, Joined::Outside | Joined::Gap) {
-            values.extend(self.file.columns().map(|_| f64::NAN));
-        }
-        Ok(Joined::Exactly)
-    }
-
-    /// Appends this file's values at time `t_s` to `values`; times must be asked for in order.
-    fn values_at(&mut self, t_s: f64, values: &mut Vec<f64>) -> Result<Joined> {
-        if !self.started {
-            self.started = true;
-            self.after = self.read()?;
-        }
-        while let Some(after) = self.after.take_if(|row| row.t_s <= t_s) {
-            if let Some(old) = self.before.replace(after) {
-                self.spare = old;
+        let before = after.checked_sub(1);
+        let distance = |row: Option<usize>| row.map_or(f64::INFINITY, |row| (own[row] - t).abs());
+        let next = (after < own.len()).then_some(after);
+        let [to_before, to_after] = [before, next].map(distance);
+        let nearest = if to_before <= to_after { before } else { next };
+        match (nearest, before, next) {
+            (Some(row), ..) if to_before.min(to_after) <= tolerance_s => {
+                (Joined::Exactly, row, row, 0.0)
             }
-            self.after = self.read()?;
+            (_, Some(a), Some(b)) if own[b] - own[a] > longest_gap_s => {
+                (Joined::Gap, a, b, f64::NAN)
+            }
+            (_, Some(a), Some(b)) => (Joined::Interpolated, a, b, (t - own[a]) / (own[b] - own[a])),
+            _ => (Joined::Outside, 0, 0, f64::NAN),
         }
-        let distance =
-            |row: &Option<Row>| row.as_ref().map_or(f64::INFINITY, |r| (r.t_s - t_s).abs());
-        let (to_before, to_after) = (distance(&self.before), distance(&self.after));
-        let nearest = if to_before <= to_after {
-            &self.before
-        } else {
-            &self.after
+    };
+    let places: Vec<(Joined, usize, usize, f64)> = t_s.iter().map(place).collect();
+    let of = |values: &Vec<f64>| {
+        let at = |&(how, a, b, part): &(Joined, usize, usize, f64)| match how {
+            Joined::Exactly => values[a],
+            Joined::Interpolated => values[a] + (values[b] - values[a]) * part,
+            Joined::Outside | Joined::Gap => f64::NAN,
         };
-        if let Some(row) = nearest
-            && to_before.min(to_after) <= self.tolerance_s
-        {
-            values.extend_from_slice(&row.values);
-            return Ok(Joined::Exactly);
-        }
-        let (Some(before), Some(after)) = (&self.before, &self.after) else {
-            return Ok(Joined::Outside);
-        };
-        let gap = after.t_s - before.t_s;
-        if gap > self.longest_gap_s {
-            return Ok(Joined::Gap);
-        }
-        let part = (t_s - before.t_s) / gap;
-        let pairs = before.values.iter().zip(&after.values);
-        values.extend(pairs.map(|(a, b)| a + (b - a) * part));
-        Ok(Joined::Interpolated)
-    }
-
-    fn read(&mut self) -> Result<Option<Row>> {
-        let mut row = std::mem::take(&mut self.spare);
-        if !self.file.next(&mut row)? {
-            return Ok(None);
-        }
-        check_order(&self.file, &row, self.last_t_s)?;
-        self.last_t_s = row.t_s;
-        Ok(Some(row))
-    }
-}
-
-/// Refuses a row whose time does not lie after `last_t_s`: two files can only be joined in order.
-pub(super) fn check_order(file: &ForeignFile, row: &Row, last_t_s: f64) -> Result<()> {
-    if row.t_s > last_t_s {
-        return Ok(());
-    }
-    Err(Error::new(
-        format!("{}, column t_s", file.place(row.number)),
-        format!(
-            "the time {} s is not later than the {last_t_s} s of the row before",
-            row.t_s
-        ),
-        "remove the row, or sort the file by time, before you join it",
-    ))
+        places.iter().map(at).collect()
+    };
+    let further = source.is_further();
+    let how = places
+        .iter()
+        .map(|place| if further { Joined::Exactly } else { place.0 });
+    (source.values.iter().map(of).collect(), how.collect())
 }

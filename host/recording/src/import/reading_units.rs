@@ -3,25 +3,14 @@
 use std::fmt;
 use std::str::FromStr;
 
+use super::unit_names::{unit_of, unit_written};
 use crate::RawUnit;
 use crate::cell::shorten;
 use crate::error::{Argument, Error, Result};
+use crate::triad_name::TriadKind;
 
-pub(super) const STANDARD_GRAVITY: f64 = 9.80665;
-
-/// Name, sensor, and size in SI; `count` and `V` have no size and hold for both sensors.
-const UNITS: [(&str, &str, Option<f64>); 10] = [
-    ("g", "accel", Some(STANDARD_GRAVITY)),
-    ("mg", "accel", Some(1e-3 * STANDARD_GRAVITY)),
-    ("m/s²", "accel", Some(1.0)),
-    ("rad/s", "gyro", Some(1.0)),
-    ("deg/s", "gyro", Some(std::f64::consts::PI / 180.0)),
-    ("mdeg/s", "gyro", Some(std::f64::consts::PI / 180_000.0)),
-    ("count", "", None),
-    ("V", "", None),
-    ("m/s2", "accel", Some(1.0)),
-    ("dps", "gyro", Some(std::f64::consts::PI / 180.0)),
-];
+/// Readings of a converter, of both sensors.
+const OF_BOTH: [&str; 2] = ["count", "V"];
 
 /// Units of gyro and accelerometer, as `g,deg/s` in any order; `count` and `V` hold for both.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -33,8 +22,8 @@ pub struct ReadingUnits {
 }
 
 /// Size of a unit in SI, if it has one.
-pub(super) fn si(unit: &str) -> Option<f64> {
-    UNITS.iter().find(|(name, ..)| *name == unit)?.2
+pub(super) fn si(symbol: &str) -> Option<f64> {
+    unit_of(symbol).map(|unit| unit.size)
 }
 
 impl ReadingUnits {
@@ -48,32 +37,26 @@ impl ReadingUnits {
             Error::new("units", problem, remedy).about(Argument::Units)
         };
         let mut words: Vec<&str> = text.split(',').map(str::trim).collect();
-        let of_both = |word: &&str| {
-            UNITS
-                .iter()
-                .any(|(name, sensor, _)| name == word && sensor.is_empty())
-        };
-        words.sort_by_key(of_both);
+        words.sort_by_key(|word| OF_BOTH.contains(word));
         for word in words {
-            let known = UNITS.iter().find(|(name, ..)| *name == word);
-            let Some((name, sensor, _)) = known else {
-                return Err(refuse(format!(
-                    "{} is no unit of readings",
-                    shorten(word.as_bytes())
-                )));
+            let both = OF_BOTH.into_iter().find(|unit| *unit == word);
+            let unit = unit_written(word);
+            let Some(name) = both.or(unit.map(|unit| unit.symbol)) else {
+                let word = shorten(word.as_bytes());
+                return Err(refuse(format!("{word} is no unit of readings")));
             };
-            let name = match *name {
-                "m/s2" => "m/s²",
-                "dps" => "deg/s",
-                other => other,
-            };
-            for (which, unit) in [("gyro", &mut self.gyro), ("accel", &mut self.accel)] {
-                // `g,count` are the two sensors' units.
-                if sensor.is_empty() && unit.is_none() || *sensor == which {
-                    if unit.is_some_and(|before| before != name) && !sensor.is_empty() {
-                        return Err(refuse(format!("the {which} has two units")));
+            for (kind, own) in [
+                (TriadKind::Gyro, &mut self.gyro),
+                (TriadKind::Accel, &mut self.accel),
+            ] {
+                if unit.is_some_and(|unit| unit.kind == kind) {
+                    if own.is_some_and(|before| before != name) {
+                        return Err(refuse(format!("the {} has two units", kind.name())));
                     }
-                    *unit = Some(name);
+                    *own = Some(name);
+                } else if both.is_some() && own.is_none() {
+                    // `g,count` are the two sensors' units.
+                    *own = both;
                 }
             }
         }

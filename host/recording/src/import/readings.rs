@@ -12,7 +12,7 @@ use super::time::Stamp;
 use crate::ahead::reader_panicked;
 use crate::columns::Column;
 use crate::error::{Argument, Error, Result};
-use crate::triad_name::TriadName;
+use crate::triad_name::{TriadKind, TriadName};
 
 /// A format of logs.
 pub(super) struct LogFormat {
@@ -122,6 +122,15 @@ impl Readings {
                 .flat_map(|t| [0, 1, 2].map(|axis| Column::of(t, axis)))
                 .collect(),
         )
+    }
+
+    /// Those of magnetometer `number`: stamps, ns, and readings, µT.
+    pub fn of_mag(number: u8, rows: impl Iterator<Item = (i64, [f64; 3])>, note: String) -> Self {
+        let kind = TriadKind::Mag;
+        let mut readings = Self::of_triads([TriadName { kind, number }]);
+        rows.for_each(|(stamp_ns, values)| readings.push(stamp_ns, values));
+        readings.notes.push(note);
+        readings.sorted()
     }
 
     /// Puts rows in order of their stamps, and keeps the first of those with the same one. Rows of gyro and accelerometer are judged as they come.

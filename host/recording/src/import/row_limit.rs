@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crate::error::Error;
 
-/// Most rows of a file, whose times take 1.2 GB of memory: 28 h at 1 kHz. Compressed files of a few MB may hold many more.
+/// Most rows of a file: 28 h at 1 kHz. Compressed files of a few MB may hold many more.
 pub(super) const MOST_ROWS: u64 = 100_000_000;
 
 /// The refusal of a file with `count` rows.

@@ -1,27 +1,19 @@
 //! The known inputs of the rows of a file, by their steps.
 
 use std::collections::{BTreeSet, HashMap};
-use std::path::Path;
 
-use super::foreign::{ForeignFile, HowToRead};
 use super::inputs::Inputs;
 use super::options::ImportOptions;
-use super::resample::{self, Resampler};
-use super::row::Row;
 use super::step_labels::StepLabels;
-use super::time::Times;
-use crate::batch::Batch;
 use crate::cell::shorten;
+use crate::columns::Column;
 use crate::declared::Reference;
 use crate::error::Result;
 
-/// A table of inputs, and the inputs of the steps met so far.
+/// A table of inputs, and the steps without an input met so far.
 pub(super) struct StepInputs {
     table: Inputs,
-    /// Rows of each step of the file, counted if angles must be divided by durations.
-    rows: HashMap<i32, u64>,
-    /// Inputs of the steps met so far; `None` if they are unknown.
-    known: HashMap<i32, Option<[f64; 6]>>,
+    unknown: BTreeSet<i32>,
 }
 
 impl StepInputs {
@@ -34,11 +26,8 @@ impl StepInputs {
             Some(path) => Some(Inputs::read(path)?),
             None => None,
         };
-        Ok(table.map(|table| Self {
-            table,
-            rows: HashMap::new(),
-            known: HashMap::new(),
-        }))
+        let unknown = BTreeSet::new();
+        Ok(table.map(|table| Self { table, unknown }))
     }
 
     /// Which of the `ref_` columns the table fills.
@@ -52,78 +41,47 @@ impl StepInputs {
     }
 
     /// Numbers of the steps met so far that are turns.
-    pub fn turns(&self) -> impl Iterator<Item = i32> + '_ {
-        self.table.turns.iter().copied()
+    pub fn turns(&self) -> Vec<i32> {
+        self.table.turns.iter().copied().collect()
     }
 
-    /// A first pass over the file at `path`: the duration of a step is known only after its last row. `irregular` are the times of a file that is to
-    /// be resampled at regular ones.
-    pub fn count_rows(
+    /// The columns of known inputs of rows with these steps.
+    pub fn of_rows(
         &mut self,
-        path: &Path,
-        how: &HowToRead<'_>,
-        irregular: Option<Times>,
-    ) -> Result<()> {
-        if !self.table.has_turns {
-            return Ok(());
+        steps: &[i32],
+        labels: &StepLabels,
+        rate_hz: f64,
+    ) -> Vec<(Column, Vec<f64>)> {
+        let mut rows: HashMap<i32, u64> = HashMap::new();
+        for step in steps.iter().filter(|step| **step >= 0) {
+            *rows.entry(*step).or_default() += 1;
         }
-        let mut file = ForeignFile::open(path, how)?;
-        let mut resampler = irregular
-            .as_ref()
-            .map(|times| Resampler::new(times.period_s()));
-        if let Some(times) = irregular {
-            file = file.with_times(times);
-        }
-        let mut row = Row::default();
-        while resample::next(&mut file, resampler.as_mut(), &mut row)? {
-            *self.rows.entry(row.step).or_default() += 1;
-        }
-        Ok(())
-    }
-
-    /// For a file of a sequence, whose rows all belong to `step`. The table of the files `before` it is used further, with its counts.
-    pub fn of_step(mut self, step: i32, before: Option<Self>) -> Self {
-        let count = self.rows.remove(&-1);
-        let mut all = before.unwrap_or(self);
-        all.rows.extend(count.map(|count| (step, count)));
-        all
-    }
-
-    /// Appends the input of a row of `step` to `batch`.
-    pub fn push(&mut self, step: i32, labels: &StepLabels, rate_hz: f64, batch: &mut Batch) {
-        let known = match step {
-            -1 => None,
-            step => *self.known.entry(step).or_insert_with(|| {
-                // n samples last n periods: each lasts until the next.
-                let rows = self.rows.get(&step).copied().unwrap_or(0);
-                self.table.input(step, labels, rows as f64 / rate_hz)
-            }),
-        };
-        for (i, target) in batch.reference.iter_mut().enumerate() {
-            if self.table.columns[i] {
-                target.push(known.map_or(f64::NAN, |input| input[i]));
+        let mut known: HashMap<i32, [f64; 6]> = HashMap::new();
+        for (step, rows) in rows {
+            // n samples last n periods: each lasts until the next.
+            match self.table.input(step, labels, rows as f64 / rate_hz) {
+                Some(input) => drop(known.insert(step, input)),
+                None => drop(self.unknown.insert(step)),
             }
         }
+        let of = |i: usize| {
+            let input = |step| known.get(step).map_or(f64::NAN, |input| input[i]);
+            (Column::Reference(i), steps.iter().map(input).collect())
+        };
+        let given = (0..6).filter(|i| self.table.columns[*i]);
+        given.map(of).collect()
     }
 
-    /// A warning about steps without an input.
-    pub fn unknown(&self, labels: &StepLabels) -> Option<String> {
-        let unknown = self.known.iter().filter(|(_, input)| input.is_none());
-        let steps: BTreeSet<i32> = unknown.map(|(&step, _)| step).collect();
-        if steps.is_empty() {
-            return None;
-        }
+    /// Warnings about steps without an input, and about inputs without a step.
+    pub fn warnings(&self, labels: &StepLabels) -> Vec<String> {
         let name = |&step: &i32| match labels.label(step) {
             Some(label) => shorten(label.as_bytes()),
             None => step.to_string(),
         };
-        let names: Vec<String> = steps.iter().take(10).map(name).collect();
-        let (count, names) = (steps.len(), names.join(", "));
-        Some(format!("the inputs of {count} dwells are unknown: {names}"))
-    }
-
-    /// A warning about inputs without a step.
-    pub fn unused(&self) -> Option<String> {
-        self.table.unused()
+        let names: Vec<String> = self.unknown.iter().take(10).map(name).collect();
+        let (count, names) = (self.unknown.len(), names.join(", "));
+        let unknown =
+            (count > 0).then(|| format!("the inputs of {count} dwells are unknown: {names}"));
+        unknown.into_iter().chain(self.table.unused()).collect()
     }
 }

@@ -72,38 +72,3 @@ impl StepLabels {
         self.labels
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn labels_are_numbered_by_first_appearance_and_keep_their_number() {
-        let mut labels = StepLabels::default();
-        let cells = ["", "x_a", " x_p", "x_a", "-1", "7", "x_p"];
-        let numbers: Vec<i32> = cells
-            .iter()
-            .map(|cell| labels.number(cell.as_bytes()).unwrap())
-            .collect();
-        assert_eq!(numbers, [-1, 0, 1, 0, -1, 2, 1]);
-        assert_eq!(labels.label(1), Some("x_p"));
-        assert_eq!(labels.label(-1), None);
-        assert_eq!(labels.into_labels(), ["x_a", "x_p", "7"]);
-    }
-
-    #[test]
-    fn numbers_stay_and_a_word_among_them_is_refused() {
-        let mut labels = StepLabels::default();
-        assert_eq!(labels.number(b"12").unwrap(), 12);
-        assert_eq!(labels.number(b"3.0").unwrap(), 3);
-        assert!(labels.number(b"x_a").unwrap_err().problem.contains("x_a"));
-        assert!(labels.into_labels().is_empty());
-    }
-
-    #[test]
-    fn a_column_of_remarks_is_no_step() {
-        let mut labels = StepLabels::default();
-        let refused = (0..20_000).any(|i| labels.number(format!("note {i}").as_bytes()).is_err());
-        assert!(refused);
-    }
-}

@@ -3,9 +3,9 @@
 use serde::Serialize;
 
 use super::broken::BrokenRows;
-use super::foreign::ForeignFile;
 use super::log_options::file_name;
 use super::preset::PresetUse;
+use super::source::Source;
 use super::time::TimeSummary;
 use crate::digits::plural;
 use crate::triad_name::TriadName;
@@ -82,9 +82,10 @@ pub struct ImportSummary {
 
 impl ImportSummary {
     /// Adds the counts, notes and warnings of `file`.
-    pub(super) fn add(&mut self, file: &ForeignFile) {
-        let place = file_name(file.path());
-        let noticed = file.noticed();
+    pub(super) fn add(&mut self, file: &Source) {
+        let place = file_name(&file.path);
+        let noticed = &file.noticed;
+        self.warnings.extend_from_slice(&noticed.warnings);
         let notes = noticed.notes.iter().map(|note| format!("{place}: {note}"));
         self.notes.extend(notes);
         let found = file.seen.found(file.rate_hz()).into_iter();
@@ -103,18 +104,18 @@ impl ImportSummary {
                 noticed.zero_bytes
             ));
         }
-        if file.stamp_wraps() > 0 {
+        if file.wraps[1] > 0 {
             self.warnings.push(format!(
                 "{place}: the time stamps wrapped to 0 {}, like a counter of 16 to 32 bits or a clock at midnight, and were unwrapped",
-                times(file.stamp_wraps())
+                times(file.wraps[1])
             ));
         }
         self.skipped.add(noticed.skipped);
-        if file.wraps() > 0 {
+        if file.wraps[0] > 0 {
             self.warnings.push(format!(
                 "{}: the column sample wrapped to 0 {}, like a counter of 16 or 32 bits, and was unwrapped",
-                file.path().display(),
-                times(file.wraps())
+                file.path.display(),
+                times(file.wraps[0])
             ));
         }
         self.broken_rows.extend(file.broken.found(place));

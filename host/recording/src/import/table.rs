@@ -10,6 +10,7 @@ use super::header::{HEAD, Header};
 use super::labelled::Samples;
 use super::lines::Lines;
 use super::noticed::Noticed;
+#[cfg(feature = "parquet")]
 use super::parquet_rows::ParquetRows;
 use super::row_filter::RowFilter;
 use super::time::{Stamp, calendar_time};
@@ -41,6 +42,7 @@ pub(super) struct Table {
 #[derive(Debug)]
 enum Source {
     Text(Box<Lines>),
+    #[cfg(feature = "parquet")]
     Parquet(Box<ParquetRows>),
 }
 
@@ -61,6 +63,9 @@ impl Table {
     ) -> Result<Self> {
         let mut noticed = Noticed::default();
         let (header, source) = match is_parquet(path) {
+            #[cfg(not(feature = "parquet"))]
+            true => return Err(crate::writer::without_parquet(path)),
+            #[cfg(feature = "parquet")]
             true => {
                 let mut rows = ParquetRows::open(path)?;
                 let header = Header::of_names(path, rows.names(), list, filters, &mut noticed)?;
@@ -94,6 +99,7 @@ impl Table {
     pub fn progress(&self) -> f64 {
         match &self.source {
             Source::Text(lines) => lines.progress(),
+            #[cfg(feature = "parquet")]
             Source::Parquet(rows) => rows.progress(),
         }
     }
@@ -103,6 +109,7 @@ impl Table {
         loop {
             let next = match &mut self.source {
                 Source::Text(lines) => lines.next(&mut self.record, &mut self.noticed)?,
+                #[cfg(feature = "parquet")]
                 Source::Parquet(rows) => rows.next(&mut self.record)?.map(|row| (row, true)),
             };
             let Some((number, ended)) = next else {

@@ -2,36 +2,67 @@
 
 use super::decimal::Decimal;
 use super::name_words::{TIME, is_in, words};
+use crate::triad_name::TriadKind;
+use crate::units::STANDARD_GRAVITY;
 
-/// Spellings of the units of a gyro, of an accelerometer and of time, the longer ones first. They count only as words of their own.
-const RATES: [(&str, &str); 3] = [
-    ("mdeg/s", "mdps|mdeg/s|mdegs|m°/s|millidps"),
-    (
-        "deg/s",
-        "deg/s|dps|°/s|deg_s|degs|degps|deg/sec|degpersec|degrees/s|degree/s|º/s|deg s-1|degrees_per_second|deg_per_s|deg.s-1",
-    ),
-    (
-        "rad/s",
-        "rad/s|radps|rads|rad_s|rad/sec|radians/s|rps|rad s-1|rad s^-1|rad.s-1|radians_per_second|rad_per_s|1/s|rad*s^-1",
-    ),
+/// A unit of readings.
+pub(super) struct UnitName {
+    pub symbol: &'static str,
+    /// What is measured in it.
+    pub kind: TriadKind,
+    /// Its size in rad/s, m/s² or µT.
+    pub size: f64,
+    /// How it is written in names of columns, in small letters, the longer ones first. They count only as separate words.
+    spellings: &'static str,
+}
+
+const fn unit(
+    symbol: &'static str,
+    kind: TriadKind,
+    size: f64,
+    spellings: &'static str,
+) -> UnitName {
+    UnitName {
+        symbol,
+        kind,
+        size,
+        spellings,
+    }
+}
+
+const DEGREE: f64 = std::f64::consts::PI / 180.0;
+
+/// Units of readings.
+#[rustfmt::skip]
+const UNITS: [UnitName; 12] = [
+    unit("mdeg/s", TriadKind::Gyro, 1e-3 * DEGREE, "mdps|mdeg/s|mdegs|m°/s|millidps"),
+    unit("deg/s", TriadKind::Gyro, DEGREE,
+        "deg/s|dps|°/s|deg_s|degs|degps|deg/sec|degpersec|degrees/s|degree/s|º/s|deg s-1|degrees_per_second|deg_per_s|deg.s-1"),
+    unit("rad/s", TriadKind::Gyro, 1.0,
+        "rad/s|radps|rads|rad_s|rad/sec|radians/s|rps|rad s-1|rad s^-1|rad.s-1|radians_per_second|rad_per_s|1/s|rad*s^-1"),
+    unit("mg", TriadKind::Accel, 1e-3 * STANDARD_GRAVITY, "mg|milli-g|millig|mgal"),
+    unit("m/s²", TriadKind::Accel, 1.0,
+        "m/s2|m/s^2|m/s²|m/s/s|mps2|ms2|m_s2|m.s-2|m/s**2|mss|m s-2|m s^-2|m/sec^2|m/s^-2|meters_per_second_squared|ms-2"),
+    unit("g", TriadKind::Accel, STANDARD_GRAVITY, "g|gs|g's|gravity|gees"),
+    unit("µT", TriadKind::Mag, 1.0, "ut|µt|μt|microtesla|micro-tesla|microteslas"),
+    unit("nT", TriadKind::Mag, 1e-3, "nt|nanotesla"),
+    unit("mG", TriadKind::Mag, 0.1, "mg|mgauss|milligauss|mgs|mga"),
+    unit("mT", TriadKind::Mag, 1e3, "mt|millitesla"),
+    unit("gauss", TriadKind::Mag, 100.0, "gauss|ga"),
+    unit("T", TriadKind::Mag, 1e6, "tesla"),
 ];
-const FORCES: [(&str, &str); 3] = [
-    ("mg", "mg|milli-g|millig|mgal"),
-    (
-        "m/s²",
-        "m/s2|m/s^2|m/s²|m/s/s|mps2|ms2|m_s2|m.s-2|m/s**2|mss|m s-2|m s^-2|m/sec^2|m/s^-2|meters_per_second_squared|ms-2",
-    ),
-    ("g", "g|gs|g's|gravity|gees"),
-];
-/// Units of a magnetometer. Only names of its columns are searched for them, so small letters do for all.
-const FIELDS: [(&str, &str); 6] = [
-    ("µT", "ut|µt|μt|microtesla|micro-tesla|microteslas"),
-    ("nT", "nt|nanotesla"),
-    ("mG", "mg|mgauss|milligauss|mgs|mga"),
-    ("mT", "mt|millitesla"),
-    ("gauss", "gauss|ga"),
-    ("T", "tesla"),
-];
+
+/// The unit with this symbol, if it has a size.
+pub(super) fn unit_of(symbol: &str) -> Option<&'static UnitName> {
+    UNITS.iter().find(|unit| unit.symbol == symbol)
+}
+
+/// The unit of a gyro or an accelerometer that a person writes like this.
+pub(super) fn unit_written(text: &str) -> Option<&'static UnitName> {
+    let mut units = UNITS.iter().filter(|unit| unit.kind != TriadKind::Mag);
+    units.find(|unit| unit.symbol == text || is_spelling(unit.spellings, text))
+}
+
 const CLOCKS: [(Decimal, &str); 4] = [
     (Decimal::Nanosecond, "ns|nsec|nanoseconds|nanosec|nanos"),
     (
@@ -51,8 +82,7 @@ fn is_spelling(spellings: &str, word: &str) -> bool {
 
 /// Whether a word is a unit of readings that cannot be part of a name, as in `gyrox rad/s`.
 pub(super) fn is_unit_word(word: &str) -> bool {
-    let mut units = RATES.iter().chain(&FORCES);
-    word.contains(['/', '²', '^']) && units.any(|(_, s)| is_spelling(s, &word.to_lowercase()))
+    word.contains(['/', '²', '^']) && unit_written(&word.to_lowercase()).is_some()
 }
 
 /// Whether a word behind a short name of a time is its unit.
@@ -84,14 +114,21 @@ fn of<T: Copy>(text: &str, units: &[(T, &str)]) -> Option<T> {
     found.map(|(unit, _)| *unit)
 }
 
+fn of_kind(text: &str, kind: TriadKind) -> Option<&'static str> {
+    let mut units = UNITS.iter().filter(|unit| unit.kind == kind);
+    units
+        .find(|unit| spelled(text, unit.spellings))
+        .map(|unit| unit.symbol)
+}
+
 /// The unit of a gyro in the names of its columns, or beside them.
 pub(super) fn rate_unit(text: &str) -> Option<&'static str> {
-    of(text, &RATES).or_else(|| text.contains(ROS[0]).then_some("rad/s"))
+    of_kind(text, TriadKind::Gyro).or_else(|| text.contains(ROS[0]).then_some("rad/s"))
 }
 
 /// The unit of an accelerometer. A separate `g` is a unit only in brackets or at the end: `acc_g_x` may be an accelerometer of the group g.
 pub(super) fn force_unit(text: &str) -> Option<&'static str> {
-    of(text, &FORCES).or_else(|| text.contains(ROS[1]).then_some("m/s²"))
+    of_kind(text, TriadKind::Accel).or_else(|| text.contains(ROS[1]).then_some("m/s²"))
 }
 
 /// The unit of a magnetometer. A separate `G` or `T` is one only in brackets or at the end.
@@ -104,20 +141,7 @@ pub(super) fn field_unit(text: &str) -> Option<&'static str> {
         (Some('T'), _) => Some("T"),
         _ => None,
     };
-    of(text, &FIELDS).or(letter)
-}
-
-/// Size of a unit of a magnetometer, µT.
-pub(super) fn microtesla(unit: &str) -> Option<f64> {
-    Some(match unit {
-        "µT" => 1.0,
-        "nT" => 1e-3,
-        "mG" => 0.1,
-        "mT" => 1e3,
-        "gauss" => 100.0,
-        "T" => 1e6,
-        _ => return None,
-    })
+    of_kind(text, TriadKind::Mag).or(letter)
 }
 
 /// A name without the unit of a field at its end: `mx_uT`, `magX mG`.
@@ -163,50 +187,41 @@ mod tests {
 
     #[test]
     fn units_are_read_as_words_of_their_own() {
-        for (text, unit) in [
-            ("Gx [°/s]", Some("deg/s")),
-            ("gyro_x_rad_s", Some("rad/s")),
-            ("G_X [mdps]", Some("mdeg/s")),
-            ("gx_dps", Some("deg/s")),
-            ("gyro", None),
-            ("w_x [rad/s]", Some("rad/s")),
-            ("AngularRate(degrees/s)", Some("deg/s")),
+        let all = |texts: &'static str| texts.split('|');
+        for (unit, texts) in [
+            (Some("deg/s"), "Gx [°/s]|gx_dps|AngularRate(degrees/s)"),
+            (Some("rad/s"), "gyro_x_rad_s|w_x [rad/s]"),
+            (Some("mdeg/s"), "G_X [mdps]"),
             // A tenth of a unit is another one.
-            ("gyroscope x (0.1 deg/s)", None),
+            (None, "gyro|gyroscope x (0.1 deg/s)"),
         ] {
-            assert_eq!(rate_unit(text), unit, "{text}");
+            all(texts).for_each(|text| assert_eq!(rate_unit(text), unit, "{text}"));
         }
-        for (text, unit) in [
-            ("A_X [mg]", Some("mg")),
-            ("AccX(g)", Some("g")),
-            ("ax (m/s^2)", Some("m/s²")),
-            ("accel_y_mps2", Some("m/s²")),
-            ("mag", None),
-            ("ax", None),
+        for (unit, texts) in [
+            (Some("mg"), "A_X [mg]"),
+            (Some("g"), "AccX(g)"),
+            (Some("m/s²"), "ax (m/s^2)|accel_y_mps2"),
+            (None, "mag|ax"),
         ] {
-            assert_eq!(force_unit(text), unit, "{text}");
+            all(texts).for_each(|text| assert_eq!(force_unit(text), unit, "{text}"));
         }
-        for (text, unit) in [
-            ("Magnetic field x (µT)", Some("µT")),
-            ("mag_x_uT", Some("µT")),
-            ("Mx [mG]", Some("mG")),
-            ("mag_x (T)", Some("T")),
-            ("MagX [G]", Some("gauss")),
-            ("magX", None),
-            ("m_T_x", None),
+        for (unit, texts) in [
+            (Some("µT"), "Magnetic field x (µT)|mag_x_uT"),
+            (Some("mG"), "Mx [mG]"),
+            (Some("T"), "mag_x (T)"),
+            (Some("gauss"), "MagX [G]"),
+            (None, "magX|m_T_x"),
         ] {
-            assert_eq!(field_unit(text), unit, "{text}");
+            all(texts).for_each(|text| assert_eq!(field_unit(text), unit, "{text}"));
         }
-        for (text, unit) in [
-            ("Time (ms)", Some(Decimal::Millisecond)),
-            ("timestamp_us", Some(Decimal::Microsecond)),
-            ("#timestamp [ns]", Some(Decimal::Nanosecond)),
-            ("t_s", Some(Decimal::Second)),
-            ("TimeUS", Some(Decimal::Microsecond)),
-            ("time", None),
-            ("seconds_elapsed", Some(Decimal::Second)),
+        for (unit, texts) in [
+            (Some(Decimal::Millisecond), "Time (ms)"),
+            (Some(Decimal::Microsecond), "timestamp_us|TimeUS"),
+            (Some(Decimal::Nanosecond), "#timestamp [ns]"),
+            (Some(Decimal::Second), "t_s|seconds_elapsed"),
+            (None, "time"),
         ] {
-            assert_eq!(clock_unit(text), unit, "{text}");
+            all(texts).for_each(|text| assert_eq!(clock_unit(text), unit, "{text}"));
         }
     }
 }

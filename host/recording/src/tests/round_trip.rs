@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use proptest::prelude::*;
 
 use super::super::*;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::tests::says;
 
 fn manifest() -> Manifest {
@@ -223,18 +223,6 @@ fn a_pair_is_a_recording_of_its_two_triads_whatever_the_samples_are_in() {
 }
 
 #[test]
-fn a_bad_cell_of_a_pair_is_told_with_the_column_of_the_file() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join(MANIFEST_FILE);
-    std::fs::write(path, manifest().to_toml().unwrap()).unwrap();
-    let csv = "t_s,gyro_x,gyro_y,gyro_z,gyro2_x,gyro2_y,gyro2_z\n0,1,2,3,4,5,6\n1,1,2,3,4,bad,6\n";
-    std::fs::write(folder.path().join("samples.csv"), csv).unwrap();
-    let pair = Recording::open(folder.path()).unwrap().pair(2).unwrap();
-    let error = pair.for_each_batch(|_| {}, |_| Ok(())).unwrap_err();
-    says(&error.to_string(), &["row 3, column gyro2_y", "\"bad\""]);
-}
-
-#[test]
 fn many_batches_and_row_groups_read_back_as_one_recording() {
     let folder = tempfile::tempdir().unwrap();
     let columns = all_columns();
@@ -378,33 +366,6 @@ fn a_directory_that_is_no_recording_says_why() {
         .unwrap_err()
         .to_string();
     assert!(file.contains("a recording is a directory"), "{file}");
-}
-
-#[test]
-fn an_error_of_the_consumer_ends_the_reading() {
-    let folder = tempfile::tempdir().unwrap();
-    for format in [SampleFormat::Csv, SampleFormat::Parquet] {
-        let path = folder.path().join(format.file_name());
-        let columns = all_columns();
-        write(&path, columns, format, &[rows(columns, 2000)]).unwrap();
-        let mut calls = 0;
-        let recording = Recording::open(&path).unwrap();
-        let error = recording
-            .in_pieces(
-                100,
-                10,
-                |_| (),
-                |_| {
-                    calls += 1;
-                    match calls {
-                        3 => Err(Error::new("consumer", "enough", "none")),
-                        _ => Ok(()),
-                    }
-                },
-            )
-            .unwrap_err();
-        assert_eq!((calls, error.refused().problem.as_str()), (3, "enough"));
-    }
 }
 
 proptest! {

@@ -147,34 +147,6 @@ fn a_sensor_with_messages_at_its_own_rate_is_read_by_them() {
 }
 
 #[test]
-fn what_is_not_there_is_refused_with_what_is() {
-    let refused = |topic, instance| open(&fixture(), topic, instance).unwrap_err().to_string();
-    let error = refused(None, None);
-    says(&error, &["several sensors", "GYR instance 1 (48 messages)"]);
-    assert!(refused(None, Some(4)).contains("no instance 4"));
-    assert!(refused(Some("BARO"), Some(0)).contains("no BARO of instance 0"));
-    assert!(refused(Some("GYR"), Some(0)).contains("no GYR of instance 0"));
-}
-
-#[test]
-fn all_sensors_are_pairs_with_numbers() {
-    let all = read(
-        &fixture(),
-        Choice {
-            topics: &[],
-            instance: Some(Instance::All),
-        },
-    );
-    let mut all = all.unwrap();
-    let first = |readings: &Readings| readings.roles()[1].name();
-    let firsts: Vec<&str> = all.iter().map(first).collect();
-    assert_eq!(firsts, ["gyro_x", "gyro2_x", "accel2_x"]);
-    // A recording has one temperature.
-    assert_eq!(all[1].roles().len(), 4);
-    close(&rows(&mut all[2])[7].1, &[0.75, 2.0, -8.0]);
-}
-
-#[test]
 fn a_magnetometer_is_in_microtesla_at_the_time_of_its_sample() {
     let mut log = before_3_3();
     let filled = |text: &str, length: usize| {

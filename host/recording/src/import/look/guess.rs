@@ -319,68 +319,6 @@ fn clock_unit_s(times: &[f64]) -> Option<f64> {
 mod tests {
     use super::*;
 
-    fn roles(names: &[&str]) -> Vec<&'static str> {
-        let names: Vec<String> = names.iter().map(|n| n.to_string()).collect();
-        guess("log.csv", &names, &[], &[], None).roles
-    }
-
-    const ALL: [&str; 7] = [
-        "t_s", "gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z",
-    ];
-
-    #[test]
-    fn the_names_of_well_known_loggers_are_understood() {
-        for names in [
-            [
-                "t_s", "gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z",
-            ],
-            ["time", "gx", "gy", "gz", "ax", "ay", "az"],
-            [
-                "Timestamp",
-                "GyroX",
-                "GyroY",
-                "GyroZ",
-                "AccX",
-                "AccY",
-                "AccZ",
-            ],
-            ["t", "wx", "wy", "wz", "fx", "fy", "fz"],
-            [
-                "Time (s)",
-                "Gyroscope x (rad/s)",
-                "Gyroscope y (rad/s)",
-                "Gyroscope z (rad/s)",
-                "Acceleration x (m/s^2)",
-                "Acceleration y (m/s^2)",
-                "Acceleration z (m/s^2)",
-            ],
-            [
-                "timestamp_us",
-                "angular_velocity.x",
-                "angular_velocity.y",
-                "angular_velocity.z",
-                "linear_acceleration.x",
-                "linear_acceleration.y",
-                "linear_acceleration.z",
-            ],
-            [
-                "SampleTimeFine",
-                "Gyr_X",
-                "Gyr_Y",
-                "Gyr_Z",
-                "Acc_X",
-                "Acc_Y",
-                "Acc_Z",
-            ],
-        ] {
-            assert_eq!(roles(&names), ALL, "{names:?}");
-        }
-        assert_eq!(
-            roles(&["time", "magX", "magY", "magZ", "temperature"]),
-            ["t_s", "mag_x", "mag_y", "mag_z", "temp_c"]
-        );
-    }
-
     #[test]
     fn the_codes_of_a_thermometer_are_not_taken_for_degrees() {
         let names = ["time", "dTemp", "Temp", "gyrox rad/s"].map(String::from);
@@ -392,51 +330,6 @@ mod tests {
             None,
         );
         assert_eq!(found.roles, ["t_s", "-", "temp_c", "gyro_x"]);
-    }
-
-    #[test]
-    fn readings_decide_units_and_names_only_where_they_agree() {
-        let names = [
-            "Time (ms)",
-            "Gyroscope x (deg/s)",
-            "Gyroscope y (deg/s)",
-            "Gyroscope z (deg/s)",
-            "ax (m/s2)",
-            "ay (m/s2)",
-            "az (m/s2)",
-        ];
-        let names: Vec<String> = names.iter().map(|n| n.to_string()).collect();
-        let units = |gyro: f64, z: f64| {
-            let row = |k: usize| vec![10.0 * k as f64, gyro, 0.0, -gyro, 0.0, 0.0, z];
-            let rows: Vec<Vec<f64>> = (0..50).map(row).collect();
-            let found = guess("log.csv", &names, &[], &rows, None);
-            assert_eq!(found.time_unit, Some(Decimal::Millisecond));
-            Units::of(&[&found], &[rows]).known()
-        };
-        assert_eq!(units(0.5, 9.7), [Some("deg/s"), Some("m/s²")]);
-        // Readings in g under a name with m/s², and counts under both.
-        assert_eq!(units(0.5, 0.99), [Some("deg/s"), Some("g")]);
-        assert_eq!(units(300.0, 16384.0), [Some("count"), Some("count")]);
-    }
-
-    #[test]
-    fn two_files_on_one_clock_show_the_unit_of_the_gyro_by_turns() {
-        // A turn by 0.5 rad/s about x, in files of their own, with stamps in microseconds and no names.
-        let at = |k: usize| 0.01 * k as f64;
-        let angle = |t: f64| if t < 2.0 { 0.0 } else { 0.5 * (t - 2.0) };
-        let rate = |t: f64| -> f64 { if t < 2.0 { 0.01 } else { 0.51 } };
-        let gyro = (0..500).map(|k| vec![1e6 * at(k), rate(at(k)).to_degrees(), 0.1, 0.2]);
-        let accel = (0..500).map(|k| {
-            let (sin, cos) = angle(at(k)).sin_cos();
-            vec![1e6 * at(k), 0.05, 9.8 * sin, 9.8 * cos]
-        });
-        let rows: Vec<Vec<Vec<f64>>> = vec![gyro.collect(), accel.collect()];
-        let guesses = [
-            guess("gyro.txt", &[], &[], &rows[0], None),
-            guess("acc.txt", &[], &[], &rows[1], None),
-        ];
-        let units = Units::of(&[&guesses[0], &guesses[1]], &rows);
-        assert_eq!(units.known(), [Some("deg/s"), Some("m/s²")]);
     }
 
     #[test]

@@ -20,13 +20,12 @@ use super::log_options::file_name;
 use super::names::{Meaning, meaning, unknown_triad};
 use super::per_column::Scale;
 use super::preview::{Preview, preview};
-use super::reading_units::{ReadingUnits, STANDARD_GRAVITY, si};
+use super::reading_units::{ReadingUnits, si};
 use super::time::{Seen, Unit, calendar_time};
-use super::unit_names::microtesla;
 use crate::error::{Argument, Error, Result};
 use crate::separator::Separator;
 use crate::triad_name::{TriadKind, TriadName};
-use crate::units::UnitFound;
+use crate::units::{STANDARD_GRAVITY, UnitFound};
 use crate::{Column, RAW_COLUMNS, RawUnit};
 
 /// Rows that are looked at: at 100 Hz ten minutes, in which a unit that is turned by hand turns.
@@ -435,7 +434,7 @@ impl Look {
         self.scale(TriadKind::Gyro, size(gyro));
         self.scale(TriadKind::Accel, size(accel));
         // Without a unit in its names a magnetometer stays in its own: the size of the field on the spot gives the factor, or none is needed.
-        let field = self.mag_unit().and_then(microtesla);
+        let field = self.mag_unit().and_then(si);
         self.scale(TriadKind::Mag, field.unwrap_or(1.0));
     }
 

@@ -32,8 +32,8 @@ pub(super) struct Layout {
     pub optional: &'static [&'static str],
     /// Factors of columns, signs included, written as for the command line.
     pub scales: &'static [&'static str],
-    /// Where the sample rate is. The line is required.
-    pub rate: Option<Rate>,
+    /// Words before the sample rate, Hz, in a line above the data. The line is required.
+    pub rate_after: Option<&'static str>,
     /// Why such a file is refused, and the remedy.
     pub refusal: Option<[&'static str; 2]>,
 }
@@ -46,19 +46,10 @@ impl Layout {
             columns,
             optional: &[],
             scales: &[],
-            rate: None,
+            rate_after: None,
             refusal: None,
         }
     }
-}
-
-/// Where a file has its sample rate, Hz.
-#[derive(Debug, Clone, Copy)]
-pub(super) enum Rate {
-    /// After these words in a line above the data.
-    Above(&'static str),
-    /// In a file of the same name with this ending, after these words.
-    Beside(&'static str, &'static str),
 }
 
 /// A table of one row that lies beside the files.

@@ -1,6 +1,6 @@
 //! The presets. To add a maker, add an entry here and a line in the table of `docs/import.md`.
 
-use super::layout::{Beside, Layout, Preset, Rate};
+use super::layout::{Beside, Layout, Preset};
 use crate::declared::RawUnit;
 
 /// A file of Sensor Logger: all have the same header, so the name shows the sensor.
@@ -44,12 +44,12 @@ const LOGGED_FOLDER: [&[&str]; 6] = [
 /// Calibrated readings of the packets, and temperature and magnetometer (in a unit of its own) if they were exported.
 const XSENS: Layout = Layout {
     optional: &["temp_c=Temperature", "mag_x=Mag_X,mag_y=Mag_Y,mag_z=Mag_Z"],
-    rate: Some(Rate::Above("Update Rate:")),
+    rate_after: Some("Update Rate:"),
     ..Layout::of("")
 };
 
 /// All of them.
-pub(super) const PRESETS: [Preset; 6] = [
+pub(super) const PRESETS: [Preset; 5] = [
     // The header of every imu0/data.csv of the EuRoC sequences and of those laid out like them (TUM VI, MRPT, OpenVINS); Burri et al., The EuRoC
     // micro aerial vehicle datasets, IJRR 2016. Stamps count from 1970; sensor.yaml beside the file gives no units.
     Preset {
@@ -178,24 +178,6 @@ pub(super) const PRESETS: [Preset; 6] = [
                 ..XSENS
             },
         ],
-        in_folder: &[],
-        mag_in_folder: &[],
-        beside: None,
-    },
-    // github.com/jitingcn/SlimeVR-Tracker-nRF-Receiver at 87996f1: scripts/data_collect_hid.py and data_collect_cdc.py. The numbers are those of the
-    // firmware before its calibration, in deg/s and g (its meta.txt has the ranges in these units); `seq` is a counter of 16 bits that counts lost samples.
-    Preset {
-        name: "slimenrf",
-        title: "raw data of a SlimeNRF tracker, by the receiver's data_collect script: NAME.csv and NAME.meta.txt",
-        raw_unit: Some(RawUnit::Si),
-        layouts: &[Layout {
-            optional: &["temp_c=temp"],
-            scales: &["gyro=0.017453292519943295", "accel=9.80665"],
-            rate: Some(Rate::Beside("meta.txt", "gyro_odr_hz=")),
-            ..Layout::of(
-                "sample=seq,gyro_x=gx,gyro_y=gy,gyro_z=gz,accel_x=ax,accel_y=ay,accel_z=az",
-            )
-        }],
         in_folder: &[],
         mag_in_folder: &[],
         beside: None,

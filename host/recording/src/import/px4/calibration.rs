@@ -108,40 +108,38 @@ impl Parameters {
         if self.epochs.is_empty() {
             return as_they_are("the log has no parameters".into());
         }
-        let mut starts: Vec<usize> = devices.iter().map(|(from, _)| *from).collect();
-        starts.extend(self.epochs.iter().map(|(from, _)| *from));
-        starts.push(0);
-        starts.sort_unstable();
-        starts.dedup();
-        starts.retain(|from| *from < readings.len().max(1));
-        let mut values = Vec::with_capacity(readings.len());
-        let mut said: Vec<String> = Vec::new();
-        for (i, &from) in starts.iter().enumerate() {
-            let to = starts.get(i + 1).copied().unwrap_or(readings.len());
-            let device = devices
+        // Which of a list of values holds for a reading.
+        let holds = |starts: &[usize], row: usize| {
+            starts
+                .partition_point(|from| *from <= row)
+                .saturating_sub(1)
+        };
+        let starts = [
+            devices
                 .iter()
-                .rev()
-                .find(|(first, _)| *first <= from)
-                .unwrap_or(&devices[0])
-                .1;
-            let epoch = self
-                .epochs
-                .iter()
-                .rev()
-                .find(|(first, _)| *first <= from)
-                .unwrap_or(&self.epochs[0]);
-            let (correction, name) = match correction(sensor, device, &epoch.1, mounted) {
-                Ok(found) => found,
-                Err(why) => return as_they_are(why),
+                .map(|(from, _)| *from)
+                .collect::<Vec<usize>>(),
+            self.epochs.iter().map(|(from, _)| *from).collect(),
+        ];
+        let (mut values, mut said) = (Vec::with_capacity(readings.len()), Vec::<String>::new());
+        let mut last = None;
+        for (row, reading) in readings.iter().enumerate() {
+            let now = [holds(&starts[0], row), holds(&starts[1], row)];
+            let correction = match &last {
+                Some((before, correction)) if *before == now => correction,
+                _ => {
+                    let (device, epoch) = (devices[now[0]].1, &self.epochs[now[1]].1);
+                    let (correction, name) = match correction(sensor, device, epoch, mounted) {
+                        Ok(found) => found,
+                        Err(why) => return as_they_are(why),
+                    };
+                    if said.last() != Some(&name) {
+                        said.push(name);
+                    }
+                    &last.insert((now, correction)).1
+                }
             };
-            values.extend(
-                readings[from..to]
-                    .iter()
-                    .map(|reading| correction.undo(*reading)),
-            );
-            if said.last() != Some(&name) {
-                said.push(name);
-            }
+            values.push(correction.undo(*reading));
         }
         let mut warnings = Vec::new();
         if said.len() > 1 {

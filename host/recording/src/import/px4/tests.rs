@@ -142,29 +142,6 @@ fn the_calibration_of_sensor_combined_is_undone_down_to_the_raw_topics() {
     close(&[mean(3), mean(4), mean(5)], &[0.678, 0.263, -9.752], 0.025);
 }
 
-#[test]
-fn of_an_old_log_that_does_not_name_its_sensor_nothing_is_undone_and_this_is_said() {
-    // Two accelerometers are calibrated, and no topic says which is in use.
-    let Some(path) = real("sample_appended_multiple.ulg") else {
-        return;
-    };
-    let mut readings = open(&path, None, None).unwrap().remove(0);
-    let warned = readings.warnings.join(" ");
-    says(&warned, &["accel: the log does not name the device"]);
-    let rows = rows(&mut readings);
-    assert_eq!((rows.len(), rows[0].0), (2373, Stamp::from(12_262_822_000)));
-    close(
-        &rows[0].1[..3],
-        &[0.003_286_037, 0.009_327_229, 0.003_948_742],
-        1e-9,
-    );
-    close(
-        &rows[2372].1[3..],
-        &[0.541_375_518, 0.300_045_58, -9.923_652_649],
-        1e-9,
-    );
-}
-
 /// A log, record by record.
 struct Written(Vec<u8>);
 

@@ -3,24 +3,58 @@
 use px4_ulog::stream_parser::ParseableFieldType;
 use px4_ulog::stream_parser::model::DataMessage;
 
+/// Fields of a topic with readings; none of one whose messages are those of a FIFO.
+pub(super) struct TopicFields {
+    pub name: &'static str,
+    fields: &'static [&'static str],
+}
+
+const fn topic(name: &'static str, fields: &'static [&'static str]) -> TopicFields {
+    TopicFields { name, fields }
+}
+
+const XYZ: &[&str] = &["x", "y", "z"];
+
+/// The topics that are read.
+pub(super) const TOPICS: [TopicFields; 7] = [
+    topic("sensor_gyro", XYZ),
+    topic("sensor_accel", XYZ),
+    topic("sensor_gyro_fifo", &[]),
+    topic("sensor_accel_fifo", &[]),
+    topic("sensor_mag", XYZ),
+    topic(
+        "vehicle_magnetometer",
+        &[
+            "magnetometer_ga[0]",
+            "magnetometer_ga[1]",
+            "magnetometer_ga[2]",
+        ],
+    ),
+    topic(
+        "sensor_combined",
+        &[
+            "gyro_rad[0]",
+            "gyro_rad[1]",
+            "gyro_rad[2]",
+            "accelerometer_m_s2[0]",
+            "accelerometer_m_s2[1]",
+            "accelerometer_m_s2[2]",
+        ],
+    ),
+];
+
 /// Samples of one instance of a topic.
 #[derive(Default)]
 pub(super) struct Topic {
     pub stamps_ns: Vec<i64>,
+    /// Three readings a sample, and those of the accelerometer in `sensor_combined`.
     pub values: Vec<[f64; 3]>,
+    pub accel: Vec<[f64; 3]>,
     pub temp_c: Vec<f64>,
     /// Ids of the sensor in order, each with the number of its first sample.
     pub devices: Vec<(usize, u32)>,
     /// Whether its readings are calibrated. Those of PX4 before 1.11 are; they have no `timestamp_sample`.
     pub calibrated: bool,
-}
-
-/// Samples of `sensor_combined`.
-#[derive(Default)]
-pub(super) struct Combined {
-    pub stamps_ns: Vec<i64>,
-    pub gyro: Vec<[f64; 3]>,
-    pub accel: Vec<[f64; 3]>,
 }
 
 impl Topic {
@@ -31,46 +65,35 @@ impl Topic {
             .map_or("no device id".into(), |(_, id)| format!("device {id}"))
     }
 
-    fn begin(&mut self, data: &DataMessage<'_>) {
+    /// Takes a message of the topic; `None` if it lacks a field.
+    pub fn take(&mut self, of: &TopicFields, data: &DataMessage<'_>) -> Option<()> {
         if let Some(id) = u32_in(data, "device_id")
             && self.devices.last().is_none_or(|(_, before)| *before != id)
         {
             self.devices.push((self.values.len(), id));
         }
-    }
-
-    /// Takes a message of the topic; `None` if it lacks a field.
-    pub fn take(&mut self, data: &DataMessage<'_>) -> Option<()> {
+        if of.fields.is_empty() {
+            return self.take_fifo(data);
+        }
         let sampled = u64_in(data, "timestamp_sample");
         let stamp_ns = nanoseconds(sampled.or_else(|| u64_in(data, "timestamp"))?)?;
-        let values = [f32_in(data, "x")?, f32_in(data, "y")?, f32_in(data, "z")?];
-        self.begin(data);
+        let readings = of.fields.iter().map(|field| f32_in(data, field));
+        let readings: Vec<f64> = readings.collect::<Option<_>>()?;
+        let (gyro, accel) = readings.split_first_chunk()?;
         self.calibrated |= sampled.is_none();
         self.stamps_ns.push(stamp_ns);
-        self.values.push(values);
+        self.values.push(*gyro);
+        self.accel.extend(accel.first_chunk());
         self.temp_c
             .push(f32_in(data, "temperature").unwrap_or(f64::NAN));
         Some(())
     }
 
-    /// Takes a message of a calibrated magnetometer; `None` if it lacks a field.
-    pub fn take_field(&mut self, data: &DataMessage<'_>) -> Option<()> {
-        let sampled = u64_in(data, "timestamp_sample");
-        let stamp_ns = nanoseconds(sampled.or_else(|| u64_in(data, "timestamp"))?)?;
-        let values = three_in(data, "magnetometer_ga")?;
-        self.begin(data);
-        self.stamps_ns.push(stamp_ns);
-        self.values.push(values);
-        self.temp_c.push(f64::NAN);
-        Some(())
-    }
-
     /// Takes a batch of the sensor's FIFO; its last sample has the time of the message.
-    pub fn take_fifo(&mut self, data: &DataMessage<'_>) -> Option<()> {
+    fn take_fifo(&mut self, data: &DataMessage<'_>) -> Option<()> {
         let last_ns = nanoseconds(u64_in(data, "timestamp_sample")?)?;
         let (step_us, scale) = (f32_in(data, "dt")?, f32_in(data, "scale")?);
         let count = usize::from(field::<u8>(data, "samples")?);
-        self.begin(data);
         for i in 0..count {
             let count_of =
                 |axis: &str| Some(f64::from(field::<i16>(data, &format!("{axis}[{i}]"))?));
@@ -82,26 +105,6 @@ impl Topic {
         }
         Some(())
     }
-}
-
-impl Combined {
-    /// Takes a message of the topic; `None` if it lacks a field.
-    pub fn take(&mut self, data: &DataMessage<'_>) -> Option<()> {
-        let stamp_ns = nanoseconds(u64_in(data, "timestamp")?)?;
-        let (gyro, accel) = (
-            three_in(data, "gyro_rad")?,
-            three_in(data, "accelerometer_m_s2")?,
-        );
-        self.stamps_ns.push(stamp_ns);
-        self.gyro.push(gyro);
-        self.accel.push(accel);
-        Some(())
-    }
-}
-
-fn three_in(data: &DataMessage<'_>, name: &str) -> Option<[f64; 3]> {
-    let axis = |i: usize| f32_in(data, &format!("{name}[{i}]"));
-    Some([axis(0)?, axis(1)?, axis(2)?])
 }
 
 fn field<T: ParseableFieldType>(data: &DataMessage<'_>, name: &str) -> Option<T> {

@@ -61,65 +61,6 @@ fn the_messages_of_a_bag_of_ros_1_and_of_ros_2_and_of_an_mcap_file_are_those_tha
     check("imu.db3", Some("/imu/data"));
 }
 
-/// `wrapper.db3` was written with Python's `sqlite3` and `struct`: the 24 messages of the other files, each behind fields of all kinds in a message of
-/// another package, whose definition is in the table of Iron.
-#[test]
-fn a_message_within_another_is_found_by_the_definition_in_the_file() {
-    check("wrapper.db3", None);
-    let definition = "Header header\nuint16 x\nOuter/Part[] parts\nsensor_msgs/Imu imu\n\
-        ===\nMSG: outer/Part\ntime when\nstring text\n===\nMSG: std_msgs/Header\nuint32 seq\ntime stamp\nstring frame_id\n\
-        ===\nMSG: sensor_msgs/Imu\nHeader header\n";
-    let definition = definition.replace("Outer/", "outer/");
-    let before = Before::of("outer/Whole", &definition).unwrap();
-    // By the serialisation of ROS 1: little endian, without padding.
-    let header = |s: u32| {
-        [
-            &7_u32.to_le_bytes()[..],
-            &s.to_le_bytes(),
-            &9_u32.to_le_bytes(),
-            &1_u32.to_le_bytes(),
-            b"f",
-        ]
-        .concat()
-    };
-    let text = [
-        &1_u32.to_le_bytes()[..],
-        &2_u32.to_le_bytes(),
-        &3_u32.to_le_bytes(),
-        b"abc",
-    ]
-    .concat();
-    let numbers: Vec<u8> = (0..37).flat_map(|k| f64::from(k).to_le_bytes()).collect();
-    let message = |inner: u32| {
-        [
-            header(5),
-            vec![0, 0],
-            2_u32.to_le_bytes().to_vec(),
-            text.clone(),
-            text.clone(),
-            header(inner),
-            numbers.clone(),
-        ]
-        .concat()
-    };
-    let imu = parse(&message(6), Layout::Ros1, Some(&before)).unwrap();
-    assert_eq!(
-        (imu.stamp_ns, imu.values),
-        (6_000_000_009, [13.0, 14.0, 15.0, 25.0, 26.0, 27.0])
-    );
-    for cut in 0..message(6).len() - 72 {
-        assert!(
-            parse(&message(6)[..cut], Layout::Ros1, Some(&before)).is_none(),
-            "{cut}"
-        );
-    }
-    assert_eq!(Before::of("outer/Whole", "string text\n"), None);
-    assert_eq!(
-        Before::of("outer/Whole", "outer/Whole again\nsensor_msgs/Imu imu\n"),
-        None
-    );
-}
-
 #[test]
 fn magnetometers_are_read_beside_the_topic_of_an_imu_and_zeros_are_none() {
     let message = |stamp: u32, field: [f64; 3]| {
@@ -127,31 +68,36 @@ fn magnetometers_are_read_beside_the_topic_of_an_imu_and_zeros_are_none() {
         let numbers = field.into_iter().chain([0.0; 9]).flat_map(f64::to_le_bytes);
         [header, b"f".to_vec(), numbers.collect()].concat()
     };
-    let mut found = Found::default();
-    for (number, name) in [(0, "/mag"), (1, "/none"), (2, "/second")] {
-        let topic = Topic::new(name, "sensor_msgs/MagneticField", "ros1", "");
-        assert!(topic.is_mag && !topic.is_inertial());
-        found.topics.insert(number, topic);
+    let kinds = ["MagneticField", "MagneticField", "MagneticField", "Imu"];
+    let mut topics = Topics::new();
+    for (number, name) in (0..).zip(["/mag", "/none", "/second", "/imu"]) {
+        let kind = format!("sensor_msgs/{}", kinds[number as usize]);
+        topics.insert(number, Topic::new(name, &kind, "ros1"));
     }
     for i in [2, 1, 3_u32] {
         let x = f64::from(i) * 1e-6;
-        found.message(0, 0, &message(i, [x, -2e-5, 4e-5]));
-        found.message(1, 0, &message(i, [0.0; 3]));
-        found.message(2, 9, &message(i, [x, 0.0, 0.0]));
+        take(&mut topics, 0, 0, &message(i, [x, -2e-5, 4e-5]));
+        take(&mut topics, 1, 0, &message(i, [0.0; 3]));
+        take(&mut topics, 2, 9, &message(i, [x, 0.0, 0.0]));
     }
-    found.message(2, 9, &message(4, [0.0; 3])[..30]);
-    let mut all = magnetometers(&found, &[]);
-    assert_eq!(all.len(), 2);
-    assert_eq!(all[1].roles()[3].name(), "mag2_z");
-    assert!(all[1].warnings[0].contains("1 messages of /second are cut"));
+    take(&mut topics, 2, 9, &message(4, [0.0; 3])[..30]);
+    let mut all = chosen(Path::new("b"), &topics, Choice::default()).unwrap();
+    assert_eq!(all.len(), 3);
+    assert_eq!(all[2].roles()[3].name(), "mag2_z");
+    assert!(all[2].warnings[0].contains("1 messages of /second are cut"));
     // In order of their stamps.
-    let rows = rows(&mut all[0]);
+    let rows = rows(&mut all[1]);
     assert_eq!(rows[0].0, Stamp::from(5_000_000_001));
     for (read, wanted) in rows[1].1.iter().zip([2.0, -20.0, 40.0]) {
         assert!((read - wanted).abs() < 1e-9, "{rows:?}");
     }
-    let chosen = magnetometers(&found, &["/second".to_owned()]);
-    assert_eq!((chosen.len(), chosen[0].roles()[1].name()), (1, "mag_x"));
+    let second = ["/second".to_owned()];
+    let choice = Choice {
+        topics: &second,
+        instance: None,
+    };
+    let all = chosen(Path::new("b"), &topics, choice).unwrap();
+    assert_eq!((all.len(), all[1].roles()[1].name()), (2, "mag_x"));
 }
 
 #[test]

@@ -36,7 +36,7 @@ fn a_packet_counter_is_no_clock_and_its_losses_are_gaps_at_the_given_rate() {
     ];
     for (file, list) in cases {
         let mut options = bench.options(&[file], &[list]);
-        let refused = import(&options, &bench.path("out"), |_| ()).unwrap_err();
+        let refused = bench.import(&options).unwrap_err();
         let arguments = &refused.refused().arguments;
         assert!(arguments.contains(&Argument::SampleRate), "{refused}");
         options.log.rate_hz = Some(128.0);
@@ -60,7 +60,7 @@ fn a_counter_without_losses_asks_for_its_rate_beside_the_unit_of_a_clock() {
     let text = packets("", &(0..400).collect::<Vec<u64>>());
     let bench = Bench::new(&[("a.csv", &text)]);
     let mut options = bench.options(&["a.csv"], &[GYRO]);
-    let refused = import(&options, &bench.path("out"), |_| ()).unwrap_err();
+    let refused = bench.import(&options).unwrap_err();
     let arguments = &refused.refused().arguments;
     assert_eq!(arguments[..], [Argument::TimeUnit, Argument::SampleRate]);
     options.log.rate_hz = Some(50.0);

@@ -106,22 +106,6 @@ fn a_file_for_each_face_has_the_specific_force_of_the_axis_that_was_up() {
 }
 
 #[test]
-fn faces_with_gravity_as_the_reference_have_no_known_inputs_and_say_so() {
-    let bench = Bench::new(&[("a.csv", &pose(0, 800)), ("b.csv", &pose(0, -800))]);
-    let mut options = bench.options(&["a.csv", "b.csv"], &[LIST]);
-    options.faces = faces(&["+z", "-z"]);
-    let (summary, batch, _) = bench.import(&options).unwrap();
-    assert!(batch.reference.iter().all(Vec::is_empty));
-    assert!(
-        summary
-            .warnings
-            .iter()
-            .any(|w| w.contains("--reference table")),
-        "{summary:?}"
-    );
-}
-
-#[test]
 fn faces_that_contradict_each_other_are_refused() {
     let bench = Bench::new(&[
         ("a.csv", &pose(0, 800)),

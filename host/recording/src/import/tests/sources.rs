@@ -30,57 +30,10 @@ fn a_sensor_that_is_logged_faster_than_it_updates_is_said_with_its_rate() {
 }
 
 #[test]
-fn rows_of_two_devices_or_units_that_take_turns_are_refused() {
-    let units = |i: usize| match i % 2 {
-        0 => at_rest(i),
-        _ => at_rest(i).map(|u| 100.0 * u),
-    };
-    let devices = |i: usize| {
-        let [x, y, z, a, b, c] = at_rest(i);
-        match noise(i, 6) > 0.0 {
-            true => [x, y, z, a, b, c],
-            false => [x, y, z, c, a, b],
-        }
-    };
-    for mixed in [log(1000, units), log(1000, devices)] {
-        let error = one_refused(&mixed, BOTH);
-        assert!(error.contains("alternate"), "{error}");
-    }
-    let (summary, ..) = one(&log(1000, at_rest), BOTH).unwrap();
-    assert!(summary.warnings.is_empty(), "{summary:?}");
-}
-
-/// One device at rest, with a lattice of `STEP` about as coarse as its noise, moved by a compensation that changes slowly.
-fn on_a_moving_lattice(i: usize) -> [f64; 6] {
-    const STEP: f64 = 0.0077;
-    let moved = 1e-4 * (i / 7 % 20) as f64;
-    let [.., z] = at_rest(i);
-    std::array::from_fn(|c| {
-        let noisy = 0.6 * STEP * (noise(i, c) + noise(i, c + 600_000))
-            + if c == 5 { z.round() } else { 0.0 };
-        (noisy / STEP).round() * STEP + moved
-    })
-}
-
-#[test]
-fn one_device_with_coarse_readings_is_no_pair_of_devices() {
-    let (summary, batch, _) = one(&log(2000, on_a_moving_lattice), BOTH).unwrap();
-    assert!(!warned(&summary, "alternate"), "{summary:?}");
-    assert_eq!(batch.t_s.len(), 2000);
-}
-
-#[test]
 fn a_person_can_say_that_suspicious_readings_are_right() {
     let swing = |i: usize| (400.0 * (0.05 * i as f64).sin()) as i32;
     let codes = |i: usize| [swing(i) as u16, 3, 9, 4, 2, 4096].map(u32::from);
-    let turns = |i: usize| match i % 2 {
-        0 => at_rest(i),
-        _ => at_rest(i).map(|u| 100.0 * u),
-    };
-    for (text, words) in [
-        (log(1000, turns), "alternate"),
-        (log(600, codes), "unsigned codes"),
-    ] {
+    for (text, words) in [(log(600, codes), "unsigned codes")] {
         let bench = Bench::new(&[("a.txt", &text)]);
         let mut options = bench.options(&["a.txt"], &[BOTH]);
         let refused = import(&options, &bench.path("out"), |_| ()).unwrap_err();
@@ -97,16 +50,6 @@ fn a_person_can_say_that_suspicious_readings_are_right() {
         assert_eq!(batch.len(), text.lines().count());
         assert!(manifest.trusts_readings());
     }
-}
-
-#[test]
-fn a_unit_that_changes_within_the_file_is_said_with_its_row() {
-    let changes = log(1000, |i| match i {
-        0..700 => at_rest(i),
-        _ => at_rest(i).map(|u| u * 1670.0),
-    });
-    let (summary, ..) = one(&changes, BOTH).unwrap();
-    warns(&summary, "300 of 1000 of them, first in row 701");
 }
 
 #[test]

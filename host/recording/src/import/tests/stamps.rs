@@ -83,55 +83,6 @@ fn stamped(stamps: impl IntoIterator<Item = u64>) -> String {
 }
 
 #[test]
-fn a_slow_log_is_asked_for_its_unit_and_not_made_a_thousand_times_as_fast() {
-    for (step, coarse, fine) in [
-        (
-            500_000,
-            "microseconds (2 Hz for 199 s)",
-            "nanoseconds (2000 Hz for 0.199 s)",
-        ),
-        (
-            1_000_000,
-            "microseconds (1 Hz for 398 s)",
-            "nanoseconds (1000 Hz for 0.398 s)",
-        ),
-        (
-            1000,
-            "milliseconds (1 Hz for 398 s)",
-            "microseconds (1000 Hz for 0.398 s)",
-        ),
-    ] {
-        let text = stamped((0..399).map(|i| 97_000_000 + step * i + 7 * i % 5));
-        let bench = Bench::new(&[("a", &text)]);
-        let mut options = bench.options(&["a"], &[GYR]);
-        let error = bench.refused(&options);
-        assert!(error.contains(coarse) && error.contains(fine), "{error}");
-        options.log.time_unit = Some("us".parse().unwrap());
-        let (summary, _, manifest) = bench.import(&options).unwrap();
-        assert!((summary.sample_rate_hz * step as f64 / 1e6 - 1.0).abs() < 1e-4);
-        assert!(
-            manifest
-                .imported_with
-                .windows(2)
-                .any(|w| w == ["--time-unit", "us"])
-        );
-        options.log.time_unit = None;
-        options.log.rate_hz = Some(1e6 / step as f64);
-        let given = bench.import(&options).unwrap().0;
-        assert_eq!(given.time[0].unit, Some(Decimal::Microsecond));
-    }
-    // The name of the column may contain the unit.
-    let text = format!(
-        "time_us;x;y;z\n{}",
-        stamped((0..399).map(|i| 500_000 * i)).replace(' ', ";")
-    );
-    let (summary, ..) = Bench::new(&[("a", &text)])
-        .import_one("t_s=time_us,gyro_x=x,gyro_y=y,gyro_z=z")
-        .unwrap();
-    assert_eq!(summary.sample_rate_hz, 2.0);
-}
-
-#[test]
 fn a_second_file_of_another_rate_has_the_unit_of_the_first_where_their_times_overlap() {
     // 100 Hz and 1 Hz in microseconds: by itself the second may be 1 kHz in nanoseconds.
     let gyro = stamped((0..3000).map(|i| 60_000_000 + 10_000 * i));

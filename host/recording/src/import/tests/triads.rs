@@ -2,7 +2,6 @@
 
 use super::*;
 use crate::import::look::{Given, Look};
-use crate::import::row::Row;
 use crate::{Column, TriadName};
 
 /// The options by a look at files.
@@ -123,13 +122,8 @@ fn a_magnetometer_in_its_own_file_costs_no_row_and_has_empty_cells_where_it_is_s
 
 #[test]
 fn a_sample_that_is_written_again_is_dropped_even_if_the_magnetometer_has_moved_on() {
-    let of = |values: &[f64]| Row {
-        values: values.to_vec(),
-        further: 1,
-        ..Row::default()
-    };
-    assert!(of(&[1.0, 2.0, 3.0]).repeats(&of(&[1.0, 2.0, 4.0])));
-    assert!(!of(&[1.0, 2.0, 3.0]).repeats(&of(&[1.0, 2.5, 3.0])));
-    // A file of a magnetometer alone.
-    assert!(!of(&[3.0]).repeats(&of(&[4.0])));
+    let text = "t_s,gyro_x,gyro_y,gyro_z,mag_x,mag_y,mag_z\n0,1,2,3,4,5,6\n0.01,2,2,3,4,5,6\n0.01,2,2,3,9,5,6\n0.02,4,2,3,4,5,6\n";
+    let bench = Bench::new(&[("a", text)]);
+    let (_, batch, _) = bench.import(&bench.options(&["a"], &[])).unwrap();
+    assert_eq!(batch.raw[0], [1.0, 2.0, 4.0]);
 }

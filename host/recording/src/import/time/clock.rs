@@ -6,9 +6,9 @@ use serde::Serialize;
 
 use super::super::decimal::Decimal;
 use super::counting::Counting;
-use super::gap::{Gap, Jitter};
+use super::gap::Jitter;
 use super::polled::Rounds;
-use super::regular::{Irregular, Regular};
+use super::regular::{Irregular, Regular, numbers};
 use super::stamp::{Seen, Stamp, Unit};
 use super::stamps::Stamps;
 use crate::error::{Argument, Error, Result};
@@ -171,6 +171,19 @@ impl Times {
         let ends = begins + self.unit.seconds(seen.lasts);
         let start = self.regular.start_s;
         begins < start + self.summary.lasts_s && ends > start
+    }
+
+    /// Times of the rows with these stamps, s.
+    pub fn of_rows(&self, stamps: &[Stamp]) -> Vec<f64> {
+        let (regular, origin) = (&self.regular, self.unit.whole(self.origin_s));
+        if regular.kept {
+            let time = |stamp: &Stamp| self.unit.seconds(stamp.since(origin));
+            return stamps.iter().map(time).collect();
+        }
+        let numbers = numbers(stamps.len(), &regular.gaps).into_iter();
+        numbers
+            .map(|number| regular.start_s + number as f64 * regular.period_s)
+            .collect()
     }
 
     /// Time between samples, s.
@@ -345,50 +358,4 @@ fn either(path: &Path, seen: &Seen<'_>, both: [Decimal; 2]) -> Error {
 fn three_digits(value: f64) -> String {
     let rounded: f64 = format!("{value:.2e}").parse().unwrap_or(value);
     rounded.to_string()
-}
-
-/// Gives each row of a file its time.
-#[derive(Debug)]
-pub(in super::super) struct Clock {
-    times: Times,
-    next_gap: usize,
-    missing: u64,
-    row: u64,
-}
-
-impl Clock {
-    pub fn new(times: Times) -> Self {
-        Self {
-            times,
-            next_gap: 0,
-            missing: 0,
-            row: 0,
-        }
-    }
-
-    /// The times that it gives.
-    pub fn times(&self) -> &Times {
-        &self.times
-    }
-
-    /// Time of the next row, which has `stamp`, s.
-    pub fn next(&mut self, stamp: &Stamp) -> f64 {
-        let Times {
-            unit,
-            origin_s,
-            regular,
-            ..
-        } = &self.times;
-        let row = self.row;
-        self.row += 1;
-        if regular.kept {
-            return unit.seconds(stamp.since(unit.whole(*origin_s)));
-        }
-        if let Some(Gap { missing, .. }) = regular.gaps.get(self.next_gap).filter(|g| g.row == row)
-        {
-            self.missing += missing;
-            self.next_gap += 1;
-        }
-        regular.start_s + (row + self.missing) as f64 * regular.period_s
-    }
 }

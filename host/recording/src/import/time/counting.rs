@@ -185,20 +185,4 @@ mod tests {
         let halves = from(0.5, (0..3000).map(f64::from).collect());
         assert_eq!(of(&halves, Some(100.0), None), Counting::Clock);
     }
-
-    #[test]
-    fn names_say_what_their_columns_count() {
-        for (name, counts) in [
-            ("seq", Named::Counter),
-            ("frame_id", Named::Counter),
-            ("Sample", Named::Counter),
-            ("SampleTimeFine", Named::Time),
-            ("timestamp", Named::Time),
-            ("sample time [ms]", Named::Unit),
-            ("t", Named::Nothing),
-            ("discount", Named::Nothing),
-        ] {
-            assert_eq!(Named::of(name), counts, "{name}");
-        }
-    }
 }

@@ -16,7 +16,7 @@ pub use gap::Jitter;
 pub use polled::Rounds;
 
 pub(super) use calendar::parse as calendar_time;
-pub(super) use clock::{Clock, Known, Times};
+pub(super) use clock::{Known, Times};
 pub(super) use polled::LONGEST;
 pub(super) use stamp::{Seen, Stamp, Unit};
 pub(super) use stamps::Stamps;

@@ -287,7 +287,7 @@ fn jitter(stamps: &[f64], regular: &Regular) -> Jitter {
 }
 
 /// Numbers of the existing samples, counting the missing ones.
-fn numbers(rows: usize, gaps: &[Gap]) -> Vec<u64> {
+pub(super) fn numbers(rows: usize, gaps: &[Gap]) -> Vec<u64> {
     let mut gaps = gaps.iter().peekable();
     let mut missing = 0;
     let number = |row: u64| {
