@@ -4,7 +4,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::batch::{Batch, SLICE};
-use super::columns::{Column, Columns, Layout};
+#[cfg(feature = "parquet")]
+use super::columns::Layout;
+use super::columns::{Column, Columns};
 use super::csv_file::{CsvFile, PIECE};
 use super::digest;
 use super::in_memory::{self, InMemory, PairInMemory};

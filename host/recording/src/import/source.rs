@@ -1,6 +1,6 @@
 //! A foreign file in memory: columns in the recording's units, and the times of its rows.
 //!
-//! All rows are kept, 8 bytes a cell: 1 GB for four hours at 1 kHz with both sensors. Only all stamps show the rate and which samples are missing, and only
+//! All rows are kept, 8 bytes a cell and 40 a row: 1.3 GB for four hours at 1 kHz with both sensors. Only all stamps show the rate and which samples are missing, and only
 //! all rows whether a sensor or a thermometer measures anything, so the other way is to read each file two or three times.
 
 use std::path::{Path, PathBuf};
@@ -115,7 +115,7 @@ impl TimeSource {
 /// Rows of a file as they are read.
 enum Rows {
     Table(Box<Table>),
-    Log(Readings, Noticed),
+    Log(Box<Readings>, Noticed),
 }
 
 impl Rows {
@@ -145,7 +145,7 @@ impl Rows {
                 warnings: std::mem::take(&mut readings.warnings),
                 ..Noticed::default()
             };
-            Self::Log(readings, noticed)
+            Self::Log(Box::new(readings), noticed)
         };
         Ok(parts.map(part).collect())
     }
