@@ -15,8 +15,6 @@
 
 pub mod closure;
 pub mod magnitude;
-#[cfg(test)]
-mod tests;
 pub mod turn;
 pub mod vector;
 
@@ -100,3 +98,6 @@ pub fn of_output(by: &ByTriad, model: &Affine<f64>) -> ByTriad {
         (_, None) => by[k],
     })
 }
+
+#[cfg(test)]
+mod tests;
