@@ -48,6 +48,8 @@ use mimu_recording::{
 
 /// Relative difference of two ranges that are the same.
 const SAME_RANGE: f64 = 0.01;
+/// Program and version, as results name them.
+pub(crate) const TOOL: &str = concat!("mimu ", env!("CARGO_PKG_VERSION"));
 /// Version of the layout of a calibration at one temperature.
 const FORMAT: &str = "mimu-calibration/1";
 /// Version of the layout with curves over temperature. A program that does not know curves refuses it, instead of applying the one model.
@@ -379,7 +381,7 @@ impl Calibration {
             trimmed: None,
             between_sessions: None,
             sessions: Vec::new(),
-            tool: crate::result::TOOL.into(),
+            tool: TOOL.into(),
             judgement: None,
             sensors: None,
             recording,

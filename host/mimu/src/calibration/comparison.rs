@@ -10,11 +10,12 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use super::Calibration;
 use super::body::BodyTriad;
 use crate::judgement::Judgement;
+use crate::one_unit::are_others;
 use crate::quantity::{AXES, Sensor};
 use crate::triad::Forward;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::statistics::mean_and_variance;
-use mimu_recording::{NORMAL_95, RawUnit, TriadName, are_two_units};
+use mimu_recording::{NORMAL_95, RawUnit, TriadName};
 
 /// Probability that any parameter is named as changed although none has changed.
 const FALSE_CHANGE: f64 = 0.05;
@@ -86,11 +87,8 @@ pub fn compare(all: &[(String, Calibration)]) -> Result<Comparison> {
                 "compare calibrations of the same readings",
             ));
         }
-        let same = match (&first.unit_id, &other.unit_id) {
-            (Some(a), Some(b)) => a.eq_ignore_ascii_case(b),
-            _ => !are_two_units(&first.device, &other.device),
-        };
-        if !same {
+        let ids = [&first.unit_id, &other.unit_id].map(|id| id.as_deref());
+        if are_others(ids, [&first.device, &other.device]) {
             notes.push(format!(
                 "{file} belongs to {:?}, but {first_file} belongs to {:?}",
                 other.device, first.device

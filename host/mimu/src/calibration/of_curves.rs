@@ -132,7 +132,7 @@ impl Calibration {
         }
         all.format = Self::format_of(true).into();
         all.created = Some(created.into());
-        all.tool = crate::result::TOOL.into();
+        all.tool = super::TOOL.into();
         all.recording.temp_c = Some(temp_c);
         all.recording.temp_range_c = Some(temperature.range_c);
         all.temperature = Some(temperature);

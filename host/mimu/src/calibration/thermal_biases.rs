@@ -162,7 +162,7 @@ impl ThermalBiases {
             device: unit.device,
             unit_id: unit.unit_id,
             created: created.into(),
-            tool: crate::result::TOOL.into(),
+            tool: super::TOOL.into(),
             judgement: unit.judgement,
             rms: unit.rms,
             range_c: unit.range_c,

@@ -41,13 +41,14 @@ use crate::effects::fitted::FittedEffect;
 use crate::effects::removal::{removable, remove_within};
 use crate::estimate::least_squares::POORLY_DETERMINED;
 use crate::fit::{Fit, Options, fit, fit_biases};
+use crate::one_unit::{RAW_UNIT, refuse_unlike};
 use crate::prepared::Prepared;
 use crate::quantity::{Sensor, significant};
 use crate::recording_problem::OfRecording;
 use crate::triad::{Covariance, Part, Triad};
 use crate::warning::Warning;
 use mimu_recording::error::{Error, Result};
-use mimu_recording::{RawUnit, Reference, two_units};
+use mimu_recording::{RawUnit, Reference};
 
 /// Result of a diagnosis in one word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, strum::IntoStaticStr)]
@@ -238,18 +239,8 @@ impl Recordings<'_> {
             ));
         }
         let raw_unit = self.first.manifest.raw_unit;
-        for other in self.later() {
-            if other.manifest.raw_unit != raw_unit {
-                return Err(Error::new(
-                    &other.place,
-                    format!(
-                        "raw_unit is {}, but that of the first recording is {raw_unit}",
-                        other.manifest.raw_unit
-                    ),
-                    "give recordings with the same raw unit",
-                ));
-            }
-        }
+        let named: Vec<_> = all().map(|r| (r.place.as_str(), &r.manifest)).collect();
+        refuse_unlike(&named, &[RAW_UNIT])?;
         for sensor in Sensor::BOTH {
             let table = self.given.and_then(|c| c.table(sensor));
             if let Some(table) = table.filter(|t| t.raw_unit != raw_unit) {
@@ -264,7 +255,7 @@ impl Recordings<'_> {
             }
         }
         if let Some(given) = self.given {
-            for recording in std::iter::once(&self.first).chain(self.later()) {
+            for recording in all() {
                 removable(recording, given.effects())?;
             }
         }
@@ -273,14 +264,6 @@ impl Recordings<'_> {
                 &self.first.place,
                 problem,
                 "effects belong to one unit: give the calibration of this unit; if it is the same unit, write the same name as device in both files",
-            ));
-        }
-        if let Some((unit, device, at)) = two_units(all().map(|r| r.manifest.device.as_str())) {
-            let place = all().nth(at).map_or("recordings", |r| r.place.as_str());
-            return Err(Error::new(
-                place,
-                format!("device is {device:?}, but that of another recording is {unit:?}"),
-                "effects belong to one unit: give recordings of one unit; if they are of one unit, import both with the same device name, or correct it in recording.toml",
             ));
         }
         Ok(())

@@ -13,8 +13,6 @@
 //!
 //! A new kind is a file with a function that gives [`Block`], a row in this table, a case in `tests.rs`, and a variant of [`crate::factor::Kind`].
 
-#[cfg(test)]
-mod tests;
 pub mod closure;
 pub mod magnitude;
 pub mod turn;
@@ -100,3 +98,6 @@ pub fn of_output(by: &ByTriad, model: &Affine<f64>) -> ByTriad {
         (_, None) => by[k],
     })
 }
+
+#[cfg(test)]
+mod tests;

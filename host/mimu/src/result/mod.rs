@@ -10,5 +10,4 @@ pub mod fit;
 pub mod next_experiment;
 pub mod sessions;
 
-/// Program and version that a result is from.
-pub(crate) const TOOL: &str = concat!("mimu ", env!("CARGO_PKG_VERSION"));
+pub(crate) use crate::calibration::TOOL;

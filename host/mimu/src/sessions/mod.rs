@@ -29,11 +29,11 @@ use mixture::Matched;
 use together::Direction;
 
 use crate::fit::{Cause, Fit, Influence, Options, fit};
+use crate::one_unit::{RAW_UNIT, REFERENCE, refuse_unlike};
 use crate::parameter::{ParameterKind, TriadParameter};
 use crate::prepared::Prepared;
 use crate::quantity::{PerSensor, Sensor};
 use crate::triad::{Covariance, Part, Triad};
-use mimu_recording::are_two_units;
 use mimu_recording::error::{Error, Result};
 
 /// Sessions of one unit, combined.
@@ -234,48 +234,18 @@ fn check(fits: &[Fit]) -> Result<()> {
     if fits.is_empty() {
         return Err(Error::new("sessions", "none was given", "name recordings"));
     }
-    // All pairs: an unnamed device is like any other, and only a second named one shows that there are two.
-    let pairs = fits
+    let all: Vec<_> = fits.iter().map(|fit| &fit.prepared).collect();
+    let named: Vec<_> = all
         .iter()
-        .enumerate()
-        .flat_map(|(k, first)| fits[k + 1..].iter().map(move |o| (first, o)));
-    for (first, other) in pairs {
-        let ours = &first.prepared.manifest;
-        let theirs = &other.prepared.manifest;
-        let place = &other.prepared.place;
-        let same = match (ours.unit_id(), theirs.unit_id()) {
-            (Some(a), Some(b)) => a.eq_ignore_ascii_case(b),
-            _ => !are_two_units(&ours.device, &theirs.device),
-        };
-        if !same {
+        .map(|p| (p.place.as_str(), &p.manifest))
+        .collect();
+    refuse_unlike(&named, &[RAW_UNIT, REFERENCE])?;
+    for (k, first) in all.iter().enumerate() {
+        let twice = |other: &&&Prepared| other.condensed.sha256 == first.condensed.sha256;
+        if let Some(other) = all[k + 1..].iter().find(twice) {
             return Err(Error::new(
-                place,
-                format!(
-                    "it is of {:?}, and {} of {:?}",
-                    theirs.device, first.prepared.place, ours.device
-                ),
-                "give sessions of one unit",
-            ));
-        }
-        if ours.raw_unit != theirs.raw_unit || ours.reference != theirs.reference {
-            return Err(Error::new(
-                place,
-                format!(
-                    "its readings are in {} with reference = \"{}\", those of {} in {} with reference = \"{}\"",
-                    theirs.raw_unit,
-                    theirs.reference,
-                    first.prepared.place,
-                    ours.raw_unit,
-                    ours.reference
-                ),
-                "give sessions recorded alike",
-            ));
-        }
-        let same = first.prepared.condensed.sha256 == other.prepared.condensed.sha256;
-        if same {
-            return Err(Error::new(
-                place,
-                format!("it has the samples of {}", first.prepared.place),
+                &other.place,
+                format!("it has the samples of {}", first.place),
                 "give each session once",
             ));
         }

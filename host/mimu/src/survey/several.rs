@@ -2,8 +2,9 @@
 
 use super::{Options, Survey, survey};
 use crate::calibration::Calibration;
+use crate::one_unit::{RAW_UNIT, SAMPLE_RATE, refuse_unlike};
+use mimu_recording::Recording;
 use mimu_recording::error::{Error, Result};
-use mimu_recording::{Recording, are_two_units};
 
 /// The noise of each recording; see [`survey`].
 ///
@@ -14,8 +15,13 @@ pub fn survey_all(
     options: Options,
     progress: impl Fn(f64),
 ) -> Result<Vec<Survey>> {
+    // Their channels are in one file.
+    let named: Vec<_> = recordings
+        .iter()
+        .map(|r| (r.place.as_str(), &r.manifest))
+        .collect();
+    refuse_unlike(&named, &[RAW_UNIT, SAMPLE_RATE])?;
     for (i, recording) in recordings.iter().enumerate().skip(1) {
-        refuse_another_unit(&recordings[0], recording)?;
         let same = |r: &Recording| r.samples.canonicalize().ok();
         let mine = same(recording);
         if mine.is_some() && recordings[..i].iter().any(|r| same(r) == mine) {
@@ -40,36 +46,4 @@ pub fn survey_all(
         ));
     }
     Ok(surveys)
-}
-
-/// Refuses a recording whose channels cannot be in one file with those of the first.
-fn refuse_another_unit(first: &Recording, other: &Recording) -> Result<()> {
-    let (one, two) = (&first.manifest, &other.manifest);
-    let place = |recording: &Recording| recording.place.clone();
-    let (what, here, there) = if are_two_units(&one.device, &two.device) {
-        (
-            "device",
-            format!("{:?}", two.device),
-            format!("{:?}", one.device),
-        )
-    } else if one.raw_unit != two.raw_unit {
-        (
-            "raw_unit",
-            two.raw_unit.to_string(),
-            one.raw_unit.to_string(),
-        )
-    } else if one.sample_rate_hz != two.sample_rate_hz {
-        (
-            "sample_rate_hz",
-            two.sample_rate_hz.to_string(),
-            one.sample_rate_hz.to_string(),
-        )
-    } else {
-        return Ok(());
-    };
-    Err(Error::new(
-        place(other),
-        format!("its {what} is {here}; that of {} is {there}", place(first)),
-        "give recordings of one unit with the same settings",
-    ))
 }
