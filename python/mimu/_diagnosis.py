@@ -103,6 +103,9 @@ class Diagnosis(GivesCalibration):
         """What ``mimu diagnose`` prints; ``everything`` as with ``--all --next``."""
         return self._native.text(everything)
 
+    def __str__(self) -> str:
+        return self.text()
+
     def __repr__(self) -> str:
         found = ", ".join(effect.id for effect in self.effects) or "no effect"
         return f"<mimu.Diagnosis of {self.device!r}: {self.verdict}, {found}>"
