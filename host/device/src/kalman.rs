@@ -9,6 +9,7 @@ use mimu_core::wire::{Capabilities, KalmanState, Prior, Request};
 use nalgebra::Vector3;
 use serde::Serialize;
 
+use super::line::patience;
 use super::received::{Answer, Event};
 use super::session::{PATIENCE, SILENCE, Session};
 use super::stream::Stream;
@@ -275,7 +276,7 @@ impl<'a> BankRun<'a> {
             {
                 return Ok(b.updates);
             }
-            if since.elapsed() > SILENCE {
+            if since.elapsed() > SILENCE * patience() {
                 let problem = "the Kalman bank does not report";
                 return Err(Error::device(self.session.port(), problem, "run it again"));
             }

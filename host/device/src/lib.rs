@@ -47,6 +47,7 @@ pub use flagged::Flagged;
 pub use identity::{Hash, Identity, Room, Started, StoredCalibration, TriadInfo, unit_name};
 pub use image::Image;
 pub use kalman::{Applied, AxisEstimate, Converging, KalmanPlan, KalmanRun, SHORTEST, kalman};
+pub use line::patience;
 pub use port::{BAUD, Port, Ports, SerialPair, ports, serial_pair};
 pub use received::{Answer, Event, LineCount, Received, Receiver, Samples};
 pub use result::{Counted, DeviceResult};

@@ -17,6 +17,15 @@ const GARBLED: Duration = Duration::from_millis(4500);
 /// Largest queue of unread events: a minute of both streams. If it is full, the caller has stopped reading.
 const WAITING: usize = 6000;
 
+/// Factor of all waits for a device: `MIMU_PATIENCE`, for one behind a slow line or beside a busy computer.
+pub fn patience() -> u32 {
+    let factor = std::env::var("MIMU_PATIENCE").ok();
+    factor
+        .and_then(|text| text.parse().ok())
+        .unwrap_or(1)
+        .max(1)
+}
+
 /// A port, and what was received on it.
 #[derive(Debug)]
 pub(super) struct Line {
@@ -45,16 +54,19 @@ impl Line {
         }
     }
 
-    /// Repeats a call until it is answered, waiting `wait` each time; `None` if no answer comes.
+    /// Repeats a call until it is answered, waiting `wait` each time; `None` if no answer comes. The answer to an earlier attempt may be late, and serves as
+    /// well.
     pub fn ask(&mut self, request: Request<'_>, wait: Duration) -> Result<Option<Answer>> {
         let mut frame = [0; MAX_FRAME];
-        for attempt in 0..ATTEMPTS {
+        let mut asked = Vec::new();
+        for attempt in 0..ATTEMPTS * patience() {
             if attempt > 0 {
                 self.repeated += 1;
             }
             // 0 is for messages without a call.
             self.last_id = self.last_id.checked_add(1).unwrap_or(1);
             let id = self.last_id;
+            asked.push(id);
             let call = Call { id, request };
             let length = encode(&call, &mut frame)
                 .map_err(|e| Error::device(self.port.name(), e, "report this"))?;
@@ -63,7 +75,7 @@ impl Line {
             let garbled = self.receiver.count().garbled;
             let mut was_garbled = false;
             while Instant::now() < until {
-                if let Some(answer) = self.listen(Some(id))? {
+                if let Some(answer) = self.listen(&asked)? {
                     return Ok(Some(answer));
                 }
                 // The garbled frame may have been the answer. The call is then repeated earlier.
@@ -76,8 +88,8 @@ impl Line {
         Ok(None)
     }
 
-    /// Reads once, and returns the answer to call `wanted` if it came. Events are queued.
-    pub fn listen(&mut self, wanted: Option<u16>) -> Result<Option<Answer>> {
+    /// Reads once, and returns the answer to one of the calls `wanted` if it came. Events are queued.
+    pub fn listen(&mut self, wanted: &[u16]) -> Result<Option<Answer>> {
         let mut bytes = [0; 4096];
         let count = self.port.read(&mut bytes)?;
         let mut answer = None;
@@ -88,7 +100,7 @@ impl Line {
             Received::Event(event) if waiting.len() < WAITING => waiting.push_back(event),
             Received::Event(_) => *overflowed += 1,
             // Late answers to abandoned calls are ignored.
-            Received::Answer(id, of) if Some(id) == wanted => {
+            Received::Answer(id, of) if wanted.contains(&id) => {
                 *before_answer = waiting.len();
                 answer = Some(of);
             }

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use mimu_core::wire::{Refusal, Request};
 
 use super::identity::Identity;
-use super::line::{ATTEMPTS, Line};
+use super::line::{ATTEMPTS, Line, patience};
 use super::origin;
 use super::port::{Port, ports};
 use super::received::{Answer, Event, LineCount};
@@ -142,13 +142,14 @@ impl Session {
         purpose: &str,
         wait: Duration,
     ) -> Result<Answer> {
+        let attempts = ATTEMPTS * patience();
         match self.line.ask(request, wait)? {
             Some(answer) => Ok(answer),
             None => Err(Error::device(
                 self.line.port.name(),
                 format!(
-                    "the device does not answer the request {purpose}, made {ATTEMPTS} times in {:.0} s ({} frames were garbled)",
-                    wait.as_secs_f64() * f64::from(ATTEMPTS),
+                    "the device does not answer the request {purpose}, made {attempts} times in {:.0} s ({} frames were garbled)",
+                    wait.as_secs_f64() * f64::from(attempts),
                     self.line.receiver.count().garbled
                 ),
                 "check the cable, reset the board and run it again",
@@ -168,7 +169,7 @@ impl Session {
     /// The next event, or `None` if none came within the wait of [`Port::read`].
     pub fn event(&mut self) -> Result<Option<Event>> {
         if self.line.waiting.is_empty() {
-            self.line.listen(None)?;
+            self.line.listen(&[])?;
         }
         if self.line.overflowed > 0 {
             return Err(Error::device(
@@ -192,7 +193,7 @@ impl Session {
                 "the device restarted meanwhile".into(),
                 "run it again; `mimu device info` shows the reset cause",
             ),
-            None if last.elapsed() > SILENCE => (
+            None if last.elapsed() > SILENCE * patience() => (
                 format!("the {name} does not arrive"),
                 "reset the board and run it again",
             ),

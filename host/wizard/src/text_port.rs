@@ -132,7 +132,7 @@ mod tests {
             clock_trusted: true,
         };
         TextOpener {
-            patience_s: 0.2,
+            patience_s: 60.0,
             ..TextOpener::new(text, None)
         }
     }
@@ -266,8 +266,9 @@ mod tests {
     #[test]
     fn where_nothing_fits_the_error_shows_the_first_lines() {
         let text = "cut\nMPU6050 OK\n1,2,3\n1,2,3\n1,2,3\n".to_string();
-        let stays = Duration::from_secs(1);
-        let opened = board("ax,ay,az,gx,gy,gz", vec![text], stays).open(0);
+        let mut opener = board("ax,ay,az,gx,gy,gz", vec![text], Duration::from_secs(60));
+        opener.patience_s = 5.0;
+        let opened = opener.open(0);
         let error = opened.err().unwrap().to_string();
         let wanted = "no line within 5 s is 6 numbers, ax,ay,az,gx,gy,gz; the first are \"MPU6050 OK\", \"1,2,3\", \"1,2,3\"";
         assert!(error.contains(wanted), "{error}");

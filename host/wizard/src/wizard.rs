@@ -13,6 +13,7 @@ use crate::procedure::{Fixture, SAME_POSE_DEG, SessionConfig, next_step};
 use crate::turn::pause;
 use crate::unit_session::{Round, UnitSession};
 use crate::waiting::Waiting;
+use mimu_device::patience;
 use mimu_equipment::drive::Driver;
 use mimu_equipment::step::Step;
 
@@ -173,7 +174,7 @@ impl<'a> Wizard<'a> {
             self.round(None, false).await?;
             let heard = self.units.iter().all(UnitSession::is_heard);
             if !heard {
-                if since.elapsed() > SILENT {
+                if since.elapsed() > SILENT * patience() {
                     let silent = self.units.iter().find(|u| !u.is_heard());
                     let name = silent.map_or_else(String::new, UnitSession::name);
                     let (problem, remedy) = match silent.is_some_and(|u| u.state.samples > 0) {
@@ -349,7 +350,7 @@ impl<'a> Wizard<'a> {
                 told = true;
             }
             self.round(None, false).await?;
-            if since.elapsed() > SILENT && !self.driver.is_person() {
+            if since.elapsed() > SILENT * patience() && !self.driver.is_person() {
                 let remedy = "close that program and run the same command";
                 return Err(Error::device("table", why, remedy).into());
             }
@@ -382,8 +383,9 @@ impl<'a> Wizard<'a> {
             if busy || !self.units.iter().all(wrong) {
                 stood = Instant::now();
             }
-            let out_of_patience =
-                since.elapsed().as_secs_f64() > self.config.patience_s || stood.elapsed() > WRONG;
+            let out_of_patience = since.elapsed().as_secs_f64()
+                > self.config.patience_s * f64::from(patience())
+                || stood.elapsed() > WRONG * patience();
             if out_of_patience && !self.driver.is_person() {
                 let why = self.units.iter().filter(|u| !u.done);
                 let why = why.filter_map(|u| u.state.waiting.as_ref()).next();
@@ -395,7 +397,7 @@ impl<'a> Wizard<'a> {
                         Waiting::to_string
                     )
                 );
-                let remedy = match stood.elapsed() > WRONG {
+                let remedy = match stood.elapsed() > WRONG * patience() {
                     true => {
                         "check the axes of the driver file, and wiring, signs and order of the accelerometer's axes"
                     }

@@ -18,12 +18,19 @@ pub struct Ran {
 pub fn command<S: AsRef<OsStr>>(folder: &Path, arguments: impl IntoIterator<Item = S>) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_mimu"));
     command.current_dir(folder).args(arguments);
+    // A busy machine makes no test fail.
+    command.env("MIMU_PATIENCE", "50");
     command.stdin(Stdio::null());
     command
 }
 
 pub fn run<S: AsRef<OsStr>>(folder: &Path, arguments: impl IntoIterator<Item = S>) -> Ran {
-    let out = command(folder, arguments).output().unwrap();
+    ran(&mut command(folder, arguments))
+}
+
+/// What a command answers.
+pub fn ran(command: &mut Command) -> Ran {
+    let out = command.output().unwrap();
     Ran {
         status: out.status.code(),
         stdout: String::from_utf8(out.stdout).expect("output is UTF-8"),

@@ -4,6 +4,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use mimu::plan::{TableAxis, Turn};
+use mimu_device::patience;
 use mimu_recording::ReferenceError;
 use mimu_recording::error::{Error, Result};
 use nalgebra::Vector3;
@@ -35,7 +36,7 @@ impl TextDriver {
     pub fn open(path: &Path) -> Result<Self> {
         let place = path.display().to_string();
         let file = DriverFile::read(path)?;
-        let timeout = Duration::from_secs_f64(file.timeout_s.clamp(0.1, 600.0));
+        let timeout = Duration::from_secs_f64(file.timeout_s.clamp(0.1, 600.0)) * patience();
         let line = match (&file.tcp, &file.serial) {
             (Some(address), None) => Line::open(&format!("tcp://{address}"), file.baud, timeout)?,
             (None, Some(port)) => Line::open(port, file.baud, timeout)?,

@@ -294,6 +294,7 @@ const TURNED: &str = "format = \"mimu-plan/1\"\ndevice = \"unit-007\"\nsample_ra
      latitude_deg = 30.5\ngravity_mps2 = 9.793\nlead_in_s = 0.0\n[[step]]\nposes = 100\ndwell_s = 0.01\n";
 
 #[test]
+#[ignore = "nightly: the emulated board; by day `self_test` of mimu-device tells motion from noise"]
 fn a_self_test_of_a_unit_that_is_turned_and_one_of_open_pins_are_told_apart() {
     let place = Place::new();
     let mut truth = unit();

@@ -9,137 +9,17 @@ use mimu_core::compensation::{Affine, Compensation};
 use mimu_core::effects::{DeviceEffect, Variable};
 use mimu_core::stored;
 use mimu_core::table::Node;
-use mimu_core::wire::{
-    BatchHead, Counters, Event as WireEvent, MAX_FRAME, Message, RAW_BYTES, RawBatch, Refusal,
-    Reply, encode,
-};
 use mimu_core::{PerSensor, Sensor};
 
-use mimu_device::{Answer, Event, Received, Receiver, contents};
+use mimu_device::contents;
 use nalgebra::{Matrix3, Vector3};
 
 use crate::random::Random;
-
-fn frame(message: &Message<'_>) -> Vec<u8> {
-    let mut out = [0; MAX_FRAME];
-    let length = encode(message, &mut out).unwrap();
-    out[..length].to_vec()
-}
-
-/// Frames of several kinds, one of them longer than a device ever sends.
-fn frames() -> Vec<Vec<u8>> {
-    let head = BatchHead {
-        first: u32::MAX - 3,
-        tick_us: u64::MAX,
-        period_ns: u32::MAX,
-        samples_lost: 0,
-        batches_dropped: 0,
-        temp_c: f32::NAN,
-        flags: u16::MAX,
-    };
-    let samples: Vec<u8> = (0..20 * RAW_BYTES).map(|i| i as u8).collect();
-    let batch = |samples| {
-        let (gyro, accel) = (f32::INFINITY, 1e-5);
-        frame(&Message::Event(WireEvent::Raw(RawBatch {
-            head,
-            scale: PerSensor { gyro, accel },
-            temperatures: &[255; 12],
-            samples,
-        })))
-    };
-    let stored = |bytes| {
-        let (offset, length) = (u32::MAX, 0);
-        let reply = Reply::Stored {
-            offset,
-            length,
-            bytes,
-        };
-        frame(&Message::Reply { id: 7, reply })
-    };
-    let refusal = Refusal::WrongHash { found: u64::MAX };
-    vec![
-        batch(&samples),
-        batch(&samples[..7]),
-        batch(&[]),
-        stored(&samples[..200]),
-        frame(&Message::Refused { id: 1, refusal }),
-        frame(&Message::Reply {
-            id: 65535,
-            reply: Reply::Counters(Counters::default()),
-        }),
-    ]
-}
-
-fn damage(bytes: &mut Vec<u8>, random: &mut Random) {
-    for _ in 0..random.below(4) {
-        if bytes.is_empty() {
-            return;
-        }
-        let at = random.below(bytes.len());
-        match random.below(7) {
-            0 => bytes[at] ^= 1 << random.below(8),
-            1 => bytes[at] = random.bits() as u8,
-            2 => bytes.truncate(at),
-            3 => drop(bytes.drain(..at)),
-            4 => bytes.insert(at, random.bits() as u8),
-            5 => drop(bytes.remove(at)),
-            _ => bytes.extend((0..random.below(2000)).map(|_| random.bits() as u8)),
-        }
-    }
-}
 
 fn environment(name: &str, default: u64) -> u64 {
     std::env::var(name)
         .ok()
         .map_or(default, |text| text.parse().expect(name))
-}
-
-#[test]
-fn no_bytes_make_the_ear_fail_or_deaf() {
-    let seed = environment("MIMU_FUZZ_SEED", 1);
-    let cases = environment("MIMU_FUZZ_CASES", 40_000);
-    let frames = frames();
-    let last = frame(&Message::Reply {
-        id: 4711,
-        reply: Reply::Done,
-    });
-    let (mut heard, mut garbled) = (0_u64, 0_u64);
-    for case in 0..cases {
-        let mut random = Random(seed ^ case.wrapping_mul(0x2545_f491_4f6c_dd1d));
-        let mut receiver = Receiver::default();
-        let mut bytes = Vec::new();
-        for _ in 0..random.below(5) {
-            let mut next = frames[random.below(frames.len())].clone();
-            damage(&mut next, &mut random);
-            bytes.extend(next);
-        }
-        let mut end = None;
-        let mut take = |receiver: &mut Receiver, bytes: &[u8]| {
-            receiver.take(bytes, |message| {
-                heard += 1;
-                if let Received::Event(Event::Raw(samples)) = &message {
-                    assert!((1..=20).contains(&samples.values.len()), "case {case}");
-                }
-                end = Some(message);
-            });
-        };
-        // In segments, as a port delivers them.
-        let middle = random.below(bytes.len() + 1);
-        take(&mut receiver, &bytes[..middle]);
-        take(&mut receiver, &bytes[middle..]);
-        take(&mut receiver, &last);
-        assert_eq!(
-            end,
-            Some(Received::Answer(4711, Answer::Done)),
-            "case {case}"
-        );
-        garbled += u64::from(receiver.count().garbled);
-    }
-    println!("seed {seed}: {cases} cases, {heard} messages, {garbled} garbled frames");
-    assert!(
-        heard > cases && garbled > 0,
-        "damage has to leave some frames whole, and not all"
-    );
 }
 
 /// CRC-32/ISO-HDLC, bit by bit.

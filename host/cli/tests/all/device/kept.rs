@@ -55,19 +55,6 @@ fn a_calibration_of_another_unit_is_refused_unless_somebody_insists() {
 }
 
 #[test]
-fn a_calibration_of_no_known_unit_is_stored_with_a_warning() {
-    let place = Place::new();
-    let peer = Peer::new(Script::default());
-    let unknown = place.calibration("V", "");
-    let stored = device(&place, &peer, &["upload", &unknown, "--json", "-"]).json();
-    let warning = stored["warnings"][0].as_str().unwrap();
-    assert!(warning.contains("the number of its unit"), "{warning}");
-    assert!(stored["unit_id"].is_null());
-    let shown = device(&place, &peer, &["info"]).stdout;
-    assert!(shown.contains("of an unknown unit, made 2026"), "{shown}");
-}
-
-#[test]
 fn what_is_fetched_and_stored_again_is_the_same_to_the_last_byte() {
     let place = Place::new();
     let peer = Peer::new(Script::default());
@@ -118,55 +105,6 @@ fn a_file_with_half_of_its_uncertainty_is_refused() {
     .unwrap();
     let refused = device(&place, &peer, &["upload", "cal.toml"]);
     refused.refused(&["unit_id", "\"12\" is not a unit's number", "24 hexadecimal"]);
-}
-
-/// The unit's calibration file with three nodes over temperature.
-fn over_temperature(place: &Place) -> String {
-    let plain = of_unit(place, &unit());
-    let text = std::fs::read_to_string(&plain).unwrap();
-    let node = |temp_c: f64, gain: f64| {
-        let triad = |sensor: &str, gain: f64| {
-            format!(
-                "[temperature.node.{sensor}]\nC = [[{gain}, 0.01, 0.0], [0.0, {gain}, 0.0], [0.0, 0.0, {gain}]]\n\
-                 o = [{}, 0.1, 0.2]\nslope_C = [[0.001, 0.0, 0.0], [0.0, 0.002, 0.0], [0.0, 0.0, -0.001]]\n\
-                 slope_o = [-0.003, 0.0, 0.001]\n",
-                -2.5 * gain
-            )
-        };
-        let (gyro, accel) = (triad("gyro", gain), triad("accel", 4.0 * gain));
-        format!("[[temperature.node]]\ntemp_c = {temp_c}\n{gyro}{accel}")
-    };
-    let nodes = [node(-10.0, 3.4), node(24.0, 3.5), node(60.0, 3.7)].concat();
-    let curves = format!(
-        "[temperature]\nrange_c = [-9.5, 59.0]\ndies.gyro.lag_s = 61.2\ndies.accel.lag_s = -12.5\n{nodes}"
-    );
-    let text = text.replace("mimu-calibration/1", "mimu-calibration/2");
-    let path = place.path("curves.toml");
-    std::fs::write(&path, format!("{text}\n{curves}")).unwrap();
-    path.display().to_string()
-}
-
-#[test]
-fn curves_that_are_fetched_and_stored_again_are_the_same_to_the_last_byte() {
-    let place = Place::new();
-    let peer = Peer::new(Script::default());
-    let file = over_temperature(&place);
-    let sent = device(&place, &peer, &["upload", &file, "--json", "-"]).json();
-    assert_eq!(sent["node_temp_c"], serde_json::json!([-10.0, 24.0, 60.0]));
-    let held = peer.seen.lock().unwrap().stored.clone().unwrap();
-    assert_eq!(held[4], 7, "layout");
-    let fetched = ["download", "-o", "back.toml", "--json", "-"];
-    let fetched = device(&place, &peer, &fetched).json();
-    assert_eq!(fetched["range_c"], serde_json::json!([-9.5, 59.0]));
-    assert_eq!(fetched["between_nodes"], "cubic");
-    let lag = fetched["lag_s"].as_f64().unwrap();
-    assert!((lag - 61.2).abs() < 1e-5, "{lag}");
-    assert_eq!(fetched["accel_lag_s"], -12.5);
-    let back = std::fs::read_to_string(place.path("back.toml")).unwrap();
-    assert!(back.contains("format = \"mimu-calibration/2\""), "{back}");
-    assert_eq!(back.matches("[[temperature.node]]").count(), 3);
-    let again = ["upload", "back.toml", "--json", "-"];
-    assert_eq!(device(&place, &peer, &again).json()["was_there"], true);
 }
 
 #[test]

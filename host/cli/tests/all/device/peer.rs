@@ -19,7 +19,7 @@ use mimu_core::wire::{
 };
 
 use super::terminal::Terminal;
-use samples::{Calibrated, Running};
+use samples::Calibrated;
 
 pub const GYRO_VOLTS: f32 = 4.2e-5;
 pub const ACCEL_VOLTS: f32 = 2.518e-5;
@@ -66,6 +66,8 @@ pub enum Act {
     Garble,
     /// The device restarts: it counts from 0 again and keeps only its calibration.
     Restart,
+    /// Nothing is sampled any more.
+    Hold,
     /// The port disappears.
     Vanish,
     /// The cable is pulled, and plugged in again after `away_ms`: a different port of the same name. The device continues meanwhile.
@@ -121,6 +123,8 @@ pub struct Script {
     pub wrong_register: Option<WrongRegister>,
     /// Flags of all its batches.
     pub flags: u16,
+    /// The next batch is not sent; then it is no more set.
+    pub lose: Arc<AtomicBool>,
 }
 
 impl Default for Script {
@@ -150,6 +154,7 @@ impl Default for Script {
             powered_for_ms: Some(0),
             wrong_register: None,
             flags: 0,
+            lose: Arc::default(),
             start: Start::Panic {
                 file: "src/x.rs",
                 line: 7,
@@ -201,7 +206,6 @@ impl Peer {
             lost: 0,
             dropped: 0,
             calibrated: None,
-            banks: [None, None],
         };
         let thread = std::thread::spawn(move || device.run());
         Self {
@@ -258,7 +262,6 @@ struct Device {
     lost: u32,
     dropped: u32,
     calibrated: Option<Calibrated>,
-    banks: [Option<Running>; 2],
 }
 
 impl Device {

@@ -101,46 +101,9 @@ fn lost_and_garbled_batches_are_gaps_that_are_counted_and_never_closed() {
     assert!(!recording.manifest.unfinished);
 }
 
-#[test]
-fn dwells_by_time_begin_and_end_with_their_sample_and_parquet_holds_the_same() {
-    let place = Place::new();
-    let peer = Peer::new(Script {
-        speed: 4.0,
-        ..Script::default()
-    });
-    let fixed = [
-        "record", "--port", &peer.path, "-o", "rec", "--for", "3s", "--json", "-",
-    ];
-    #[rustfmt::skip]
-    let more = ["--step-every", "700ms,300ms", "--format", "parquet", "--gravity", "9.81"];
-    let result = mimu(&place, &[&fixed[..], &more].concat()).json();
-    assert_eq!(result["dwells"], 3);
-    assert!(place.path("rec/samples.parquet").exists());
-    assert!(!place.path("rec/samples.csv").exists());
-    let (recording, rows) = rows(&place, "rec");
-    assert_eq!(recording.manifest.gravity_mps2, 9.81);
-    check_rows(&rows);
-    let expected = |k: usize| {
-        if k % 1000 < 700 {
-            (k / 1000) as i32
-        } else {
-            -1
-        }
-    };
-    let steps: Vec<i32> = (0..3000).map(expected).collect();
-    assert_eq!(rows.step, steps);
-    // The recording exists already, and is kept.
-    let before = std::fs::read(place.path("rec/samples.parquet")).unwrap();
-    mimu(&place, &fixed).refused(&["rec", "exists already"]);
-    assert_eq!(
-        std::fs::read(place.path("rec/samples.parquet")).unwrap(),
-        before
-    );
-}
-
 /// Waits until the recording `rec` has so many bytes of samples. Returns how many it has.
 fn wait_for(place: &Place, bytes: u64) -> u64 {
-    let until = Instant::now() + Duration::from_secs(60);
+    let until = Instant::now() + Duration::from_secs(600);
     loop {
         let has = std::fs::metadata(place.path("rec/samples.csv")).map_or(0, |m| m.len());
         if has >= bytes {
@@ -157,7 +120,7 @@ fn interrupt(child: &Child) {
 }
 
 #[test]
-fn lines_on_standard_input_begin_and_end_dwells() {
+fn lines_on_standard_input_begin_and_end_dwells_and_ctrl_c_the_recording() {
     let place = Place::new();
     let peer = Peer::new(Script::default());
     let arguments = ["record", "--port", &peer.path, "-o", "rec", "--steps"];
@@ -177,7 +140,10 @@ fn lines_on_standard_input_begin_and_end_dwells() {
     more(2);
     interrupt(&child);
     assert!(child.wait().unwrap().success());
-    let (_, rows) = rows(&place, "rec");
+    let (recording, rows) = rows(&place, "rec");
+    assert!(!recording.manifest.unfinished);
+    check_rows(&rows);
+    assert_eq!(peer.count("Stop"), 1);
     let mut runs = rows.step.clone();
     runs.dedup();
     assert_eq!(runs, [-1, 0, -1, 1]);
@@ -186,20 +152,24 @@ fn lines_on_standard_input_begin_and_end_dwells() {
 #[test]
 fn a_killed_recording_is_there_up_to_the_last_second() {
     let place = Place::new();
-    let peer = Peer::new(Script::default());
+    let peer = Peer::new(Script {
+        acts: vec![(5_500, Act::Hold)],
+        ..Script::default()
+    });
     let mut child = start(&place, &["record", "--port", &peer.path, "-o", "rec"]);
-    // The time of the kill does not matter: the file is that long only if the rows are written.
-    wait_for(&place, 150_000);
     let samples = place.path("rec/samples.csv");
-    let sent = peer.seen.lock().unwrap().next;
+    // Of 5.5 s all but the last second are in the file, however slowly they come.
+    let mut bytes = 0;
+    let lines = || std::fs::read_to_string(&samples).map_or(0, |text| text.lines().count());
+    while lines() < 4_500 {
+        bytes = wait_for(&place, bytes + 1);
+    }
     // SIGKILL: no code of the program runs any more.
     child.kill().unwrap();
     child.wait().unwrap();
     let (recording, rows) = rows(&place, "rec");
     check_rows(&rows);
     assert!(gaps(&rows).is_empty());
-    let last = rows.t_s.last().unwrap() * 1000.0;
-    assert!(last + 1000.0 > f64::from(sent), "{last} of {sent}");
     assert!(recording.manifest.unfinished);
     let warning = recording.warnings[0].to_string();
     assert!(warning.contains("unfinished"), "{warning}");
@@ -302,20 +272,6 @@ fn a_port_that_vanishes_ends_the_recording_with_what_there_is() {
 }
 
 #[test]
-fn ctrl_c_ends_a_recording_and_does_not_cut_it() {
-    let place = Place::new();
-    let peer = Peer::new(Script::default());
-    let mut child = start(&place, &["record", "--port", &peer.path, "-o", "rec"]);
-    wait_for(&place, 100_000);
-    interrupt(&child);
-    assert!(child.wait().unwrap().success());
-    let (recording, rows) = rows(&place, "rec");
-    assert!(!recording.manifest.unfinished);
-    check_rows(&rows);
-    assert_eq!(peer.count("Stop"), 1);
-}
-
-#[test]
 fn a_recording_goes_on_after_the_cable_was_pulled_and_the_device_s_clock_measures_the_gap() {
     let place = Place::new();
     let peer = Peer::new(Script {
@@ -398,32 +354,4 @@ fn a_plan_by_time_gives_every_sample_of_a_dwell_its_input() {
         }
     }
     assert_eq!(row, 1750);
-}
-
-#[test]
-fn a_table_of_inputs_is_taken_by_the_labels_of_its_rows_and_turns_at_the_end() {
-    let place = Place::new();
-    let inputs = "step,turn_x_deg,ref_force_z_mps2\nface_up,,9.81\nabout_x,90,\nface_down,,-9.81\n";
-    std::fs::write(place.path("inputs.csv"), inputs).unwrap();
-    let peer = Peer::new(Script {
-        speed: 4.0,
-        ..Script::default()
-    });
-    #[rustfmt::skip]
-    let arguments = [
-        "record", "--port", &peer.path, "-o", "rec", "--inputs", "inputs.csv", "--step-every", "500ms,100ms", "--for", "1100ms", "--gravity",
-        "9.81", "--json", "-",
-    ];
-    let result = mimu(&place, &arguments).json();
-    // Of the last one nothing was recorded, which is reported.
-    let warning = result["warnings"][0].as_str().unwrap();
-    assert!(warning.contains("face_down"), "{warning}");
-    let (recording, rows) = rows(&place, "rec");
-    let manifest = &recording.manifest;
-    assert_eq!(manifest.step_labels, ["face_up", "about_x", "face_down"]);
-    assert_eq!(manifest.turn_steps, [1]);
-    assert_eq!(rows.reference[5][10], 9.81);
-    assert!(rows.reference[0][10].is_nan() && rows.reference[5][550].is_nan());
-    // 90 degrees in half a second.
-    assert_eq!((rows.step[700], rows.reference[0][700]), (1, 180.0));
 }

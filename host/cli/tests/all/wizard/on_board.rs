@@ -88,9 +88,8 @@ fn a_session_that_was_killed_and_unplugged_goes_on_to_a_stored_calibration_that_
     let mut child = bench.wizard(&arguments).spawn().unwrap();
     assert!(bench.heard(&mut child, "dwell", 2));
     bench.tell("LINK OFF");
-    std::thread::sleep(std::time::Duration::from_millis(300));
-    bench.tell("LINK ON");
     let interrupted = bench.heard(&mut child, "interrupted", 1);
+    bench.tell("LINK ON");
     let out = child.wait_with_output().unwrap();
     assert!(interrupted, "{out:?}");
     let told =

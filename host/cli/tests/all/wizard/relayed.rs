@@ -4,7 +4,7 @@ use std::ffi::OsString;
 use std::path::Path;
 use std::sync::mpsc::{Receiver, Sender, channel};
 
-use mimu::calibration::{Calibration, TriadTable};
+use mimu::calibration::Calibration;
 use mimu_cli::called::{Refusal, Session, wizard};
 use mimu_recording::{ClockRate, Manifest, Times};
 use mimu_wizard::event::{Event, Question, SessionState, UserRequest, View};
@@ -14,7 +14,7 @@ use mimu_wizard::session::Outcome;
 use mimu_wizard::turn::go_on;
 
 use super::text::{judge, lines, lines_in};
-use crate::command::{done, mimu, says};
+use crate::command::{done, says};
 
 /// Relays events, and ends the session on request.
 struct Told {
@@ -276,38 +276,4 @@ fn with_the_population_six_faces_end_in_a_calibration_whose_intervals_hold() {
         "{unit:?}"
     );
     judge(&calibration, "");
-}
-
-#[test]
-fn a_gyro_that_is_not_of_the_population_is_named_and_fitted_without_it() {
-    let folder = tempfile::tempdir().unwrap();
-    let kind = folder.path().join("kind.toml");
-    std::fs::write(&kind, population(1.3)).unwrap();
-    let out = folder.path().join("out");
-    let with = format!(" --prior {}", kind.display());
-    let (lines, mut at) = (lines_in(faces(1.2)), 0);
-    let mut relay = begin_with(&out, &with).unwrap_or_else(|why| panic!("{why}"));
-    relay.send(0.0, Arrival::Opened);
-    // Its five turns determine it poorly; the accelerometer keeps its prior.
-    let (outcome, _) = relay.hear(&lines, &mut at, usize::MAX).unwrap();
-    let notes = &outcome.unwrap().units[0].notes;
-    let named = notes.iter().find(|n| n.contains("not of the population"));
-    assert!(named.is_some_and(|n| n.starts_with("gyro")), "{notes:?}");
-    let made = Calibration::read(&out.join("calibration.toml")).unwrap();
-    let estimator = |of: Option<TriadTable>| of.and_then(|t| t.judged).unwrap().estimator;
-    assert_eq!(estimator(made.gyro), "turns and rests");
-    assert!(estimator(made.accel).ends_with("a prior"));
-    judge(&out.join("calibration.toml"), "");
-    // What is refused before any port is opened.
-    let why = begin_with(
-        &folder.path().join("other"),
-        &format!("{with} --whole-turns"),
-    );
-    let why = why.err().unwrap();
-    says(&why, &["whole turns are fitted without a prior"]);
-    let on_table = "wizard -o other --port nowhere --gravity 9.8 --fixture table --prior kind.toml";
-    let why = mimu(folder.path(), on_table).stderr;
-    says(&why, &["gravity is the only reference"]);
-    let nothing = begin_with(&out, " --prior nothing.toml").err().unwrap();
-    assert!(nothing.contains("nothing.toml"), "{nothing}");
 }

@@ -91,6 +91,7 @@ pub fn lines_in(first: Vec<Step>) -> Vec<String> {
 }
 
 #[test]
+#[ignore = "nightly: in real time; by day `relayed` takes the same lines in virtual time"]
 fn a_board_that_writes_lines_ends_in_a_calibration_whose_intervals_hold_its_parameters() {
     let folder = tempfile::tempdir().unwrap();
     // 100 lines per second by the board's clock, written 25 times faster.

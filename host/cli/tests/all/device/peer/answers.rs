@@ -2,15 +2,12 @@
 
 use std::time::Instant;
 
-use mimu_core::kalman::Bank;
 use mimu_core::stored::{self, MAX_LENGTH, ROOM};
 use mimu_core::wire::{
-    Call, Capabilities, Counters, Greeting, KalmanAxis, KalmanState, Message, Prior, Refusal,
-    Reply, Request, Slot, StoredInfo, TestRow, TestTable, Verdict,
+    Call, Capabilities, Counters, Greeting, Message, Refusal, Reply, Request, Slot, StoredInfo,
+    TestRow, TestTable, Verdict,
 };
-use nalgebra::Vector3;
 
-use super::samples::Running;
 use super::{Device, UNIT_ID};
 
 impl Device {
@@ -76,7 +73,7 @@ impl Device {
     pub(super) fn begin_anew(&mut self) {
         (self.began, self.next) = (Instant::now(), 0);
         (self.streams, self.upload) = ((false, false), None);
-        (self.calibrated, self.banks) = (None, [None, None]);
+        self.calibrated = None;
     }
 
     pub(super) fn answer(&mut self, call: &Call<'_>) {
@@ -208,40 +205,6 @@ impl Device {
                 self.upload = None;
                 self.calibrated = None;
                 self.seen.lock().unwrap().stored = Some(received);
-            }
-            Request::KalmanStart {
-                sensor,
-                noise,
-                prior: Prior::Diffuse { span },
-            } => {
-                let noise = Vector3::from(noise);
-                self.banks[sensor as usize] = Some(Running {
-                    filters: Bank::diffuse(&noise, span),
-                    noise,
-                    input: None,
-                    offered: 0,
-                    state: KalmanState {
-                        sensor,
-                        last: 0,
-                        updates: 0,
-                        rejected: 0,
-                        skipped: 0,
-                        axes: [KalmanAxis {
-                            mean: [0.0; 4],
-                            covariance: [0.0; 10],
-                        }; 3],
-                    },
-                });
-            }
-            Request::KalmanInput { sensor, input } => {
-                let bank = self.banks[sensor as usize]
-                    .as_mut()
-                    .ok_or(Refusal::NoBank)?;
-                bank.input = input.map(Vector3::from);
-            }
-            Request::KalmanEnd { sensor } => {
-                let bank = self.banks[sensor as usize].take().ok_or(Refusal::NoBank)?;
-                return Ok(Reply::Kalman(bank.state()));
             }
             Request::ResetCounters => {}
             _ => return Err(Refusal::Unknown),

@@ -4,13 +4,10 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use mimu_core::effects;
-use mimu_core::kalman::Bank;
 use mimu_core::stored::{self, ROOM, Stored};
 use mimu_core::wire::{
-    BATCH, BatchHead, CompensatedBatch, Counts, Event, KalmanState, Message, RawBatch, flags,
-    reading,
+    BATCH, BatchHead, CompensatedBatch, Counts, Event, Message, RawBatch, flags, reading,
 };
-use nalgebra::Vector3;
 
 use super::{Act, Device, TEMP_C, sums};
 
@@ -18,14 +15,6 @@ pub(super) struct Calibrated {
     pub(super) stored: Stored,
     pub(super) effects: effects::State<f32, ROOM>,
     pub(super) followed_us: u64,
-}
-
-pub(super) struct Running {
-    pub(super) filters: Bank<f32>,
-    pub(super) noise: Vector3<f32>,
-    pub(super) input: Option<Vector3<f32>>,
-    pub(super) state: KalmanState,
-    pub(super) offered: u32,
 }
 
 impl Device {
@@ -43,10 +32,12 @@ impl Device {
                     self.script.acts.remove(0);
                     Some(act)
                 }
+                _ if self.script.lose.swap(false, Ordering::Relaxed) => Some(Act::Drop),
                 _ => None,
             };
             match act {
                 Some(Act::Restart) => return self.restart(),
+                Some(Act::Hold) => return self.script.speed = 0.0,
                 Some(Act::Vanish) => self.port = None,
                 Some(Act::Unplug { away_ms }) => {
                     if let Some(link) = &self.script.link {
@@ -122,16 +113,6 @@ impl Device {
                 sample.gyro.x += self.script.bent;
                 compensated.extend_from_slice(&CompensatedBatch::pack(&sample));
             }
-            for i in 0..2 {
-                let of = if i == 0 { reading.gyro } else { reading.accel };
-                let due = self.banks[i]
-                    .as_mut()
-                    .is_some_and(|bank| bank.offer(n, &of));
-                if let (true, Some(bank)) = (due, &self.banks[i]) {
-                    let state = bank.state();
-                    self.frame(&Message::Event(Event::Kalman(state)), false);
-                }
-            }
         }
         if act == Some(Act::Drop) {
             return;
@@ -156,33 +137,5 @@ impl Device {
             };
             self.frame(&Message::Event(Event::Compensated(batch)), garble);
         }
-    }
-}
-
-impl Running {
-    pub(super) fn offer(&mut self, n: u32, reading: &Vector3<f32>) -> bool {
-        self.state.last = n;
-        match self.input {
-            None => self.state.skipped += 1,
-            Some(input) => {
-                self.filters.update(&input, reading, &self.noise).unwrap();
-                self.state.updates += 1;
-            }
-        }
-        self.offered += 1;
-        self.offered.is_multiple_of(200)
-    }
-
-    pub(super) fn state(&self) -> KalmanState {
-        let mut state = self.state;
-        for (axis, filter) in state.axes.iter_mut().zip(&self.filters.axes) {
-            axis.mean = filter.mean().into();
-            let p = filter.covariance();
-            let upper = (0..4).flat_map(|i| (i..4).map(move |j| (i, j)));
-            for (out, at) in axis.covariance.iter_mut().zip(upper) {
-                *out = p[at];
-            }
-        }
-        state
     }
 }
