@@ -361,13 +361,6 @@ fn bits_of_a_later_version_and_lags_that_nothing_follows_are_refused() {
 }
 
 #[test]
-fn what_is_not_known_of_an_origin_is_zero() {
-    let unknown = bytes(&[node(25.0, &regular())], &[]);
-    assert_eq!(unknown[12..100], [0; 88]);
-    assert_eq!(decode(&unknown).unwrap().origin, Origin::UNKNOWN);
-}
-
-#[test]
 fn everything_at_its_longest_has_room() {
     let nodes: Vec<_> = (0..NODES).map(|k| node(k as f32, &regular())).collect();
     let named = |id, coefficients: &[f32]| DeviceEffect::named(id, coefficients, None).unwrap();

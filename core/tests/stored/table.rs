@@ -1,13 +1,10 @@
 //! Curves between nodes, and beyond them, against cubics and lines in double precision.
 
 use mimu_core::PerSensor;
-use mimu_core::compensation::Sample;
-use mimu_core::single;
 use mimu_core::table::{BEYOND_C, Place, Table};
-use nalgebra::Vector3;
 use proptest::prelude::*;
 
-use super::{node, numbers_of, sloping, two_nodes};
+use super::{numbers_of, sloping, two_nodes};
 
 #[test]
 fn outside_the_nodes_the_end_slope_goes_on_for_five_kelvin_and_is_then_held() {
@@ -94,19 +91,6 @@ fn cubic([t0, t1]: [f64; 2], [v0, v1]: [f64; 2], [s0, s1]: [f64; 2], t: f64) -> 
 }
 
 proptest! {
-    /// The device's version, compared bit by bit.
-    #[test]
-    fn compensation_on_the_device_is_that_of_the_model(
-        numbers in prop::collection::vec(-20.0_f32..20.0, 24), raw in prop::collection::vec(0.0_f32..5.0, 6),
-    ) {
-        let model = node(0.0, &numbers.try_into().unwrap()).model;
-        let raw = Sample {
-            gyro: Vector3::new(raw[0], raw[1], raw[2]),
-            accel: Vector3::new(raw[3], raw[4], raw[5]),
-        };
-        prop_assert_eq!(single::compensate(&model, &raw), model.apply(&raw));
-    }
-
     /// Every number is on the cubic of its two neighbours, on the end slope for five kelvin outside, and constant beyond.
     #[test]
     fn every_number_is_on_the_curve_of_its_nodes(

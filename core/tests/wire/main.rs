@@ -1,5 +1,4 @@
 //! The line between device and host: bytes that must never change, and a decoder's reaction to anything else.
 
 mod frames;
-mod frozen;
 mod golden;
