@@ -1,88 +1,68 @@
 //! Judgements of clean sessions and of sessions with an effect.
 
-use std::collections::BTreeMap;
 use std::time::Instant;
 
 use mimu::judgement::JudgementKind::{self, Good, Misfit, Suspect, Unexplained, Untested};
 use mimu_tests::judged::{Clean, Judged, Kind, Pair, WithEffect, pairs_of_array};
 use mimu_tests::sessions::ARRAY_UNITS;
+use mimu_tests::study::{Figure, Table, counted};
 use rayon::prelude::*;
 
-use super::planted::median;
-
-/// Results of the sessions of a kind.
-#[derive(Debug, Default)]
-struct Row {
-    clean: Vec<Clean>,
-    with_effect: Vec<WithEffect>,
-}
-
 /// Judgements from the best to the worst, and a refusal.
-fn kinds() -> [Option<JudgementKind>; 6] {
-    [
-        Some(Good),
-        Some(Untested),
-        Some(Suspect),
-        Some(Unexplained),
-        Some(Misfit),
-        None,
-    ]
-}
+const KINDS: [Option<JudgementKind>; 6] = [
+    Some(Good),
+    Some(Untested),
+    Some(Suspect),
+    Some(Unexplained),
+    Some(Misfit),
+    None,
+];
 
-/// `part` of `all` in per cent.
-fn share(part: usize, all: usize) -> String {
-    match all {
-        0 => "-".into(),
-        _ => format!("{:.1}", 100.0 * part as f64 / all as f64),
+/// Of clean sessions, %.
+const CLEAN: [&str; 10] = [
+    "good",
+    "untested",
+    "suspect",
+    "unexplained",
+    "misfit",
+    "refused",
+    "good or untested",
+    "gyro intervals",
+    "accelerometer intervals",
+    "verified: good or untested",
+];
+
+/// Power: how often a fit objects, how often the effect is found, how often a calibration is still called good.
+const POWER: [(&str, Figure); 5] = [
+    ("with an effect", Figure::Sum),
+    ("effect over noise, median", Figure::Median),
+    ("fit: unexplained or worse", Figure::Percent),
+    ("found", Figure::Percent),
+    ("its file verified: good", Figure::Percent),
+];
+
+fn of_clean(clean: &Clean) -> [f64; 10] {
+    let mut values = [f64::NAN; 10];
+    for (value, kind) in values.iter_mut().zip(KINDS) {
+        *value = counted(clean.judged.kind == kind);
     }
+    let unobjected = |judged: &Judged| counted(judged.is_unobjected());
+    values[6] = unobjected(&clean.judged);
+    values[9] = clean.verified.as_ref().map_or(f64::NAN, unobjected);
+    values
 }
 
-/// Share of the judgements that `is` selects.
-fn of<'a>(all: impl Iterator<Item = &'a Judged> + Clone, is: impl Fn(&Judged) -> bool) -> String {
-    share(all.clone().filter(|j| is(j)).count(), all.count())
-}
-
-/// Power: the effect's strength, how often a fit objects, how often it is found, how often a calibration is still called good.
-const POWER: &str =
-    "effect over noise, median | fit: unexplained or worse | found | its file verified: good";
-
-fn power(all: &[&WithEffect]) -> String {
-    let strengths: Vec<f64> = all.iter().map(|w| w.strength).collect();
-    let strength = median(&strengths).map_or("-".into(), |m| format!("{m:.1}"));
-    let judged = all.iter().map(|w| &w.judged);
+fn power(with: &WithEffect) -> [f64; 5] {
     // A refusal is no better than the worst judgement.
-    let worse = of(judged, |j| j.kind.is_none_or(|kind| kind >= Unexplained));
-    let found: Vec<bool> = all
-        .iter()
-        .filter_map(|w| Some(w.found.as_ref()?.is_right))
-        .collect();
-    let found = share(found.iter().filter(|right| **right).count(), found.len());
-    let verified = all.iter().filter_map(|w| w.verified.as_ref());
-    let good = of(verified, |j| j.kind == Some(Good));
-    format!("{strength} | {worse} | {found} | {good}")
-}
-
-impl Row {
-    fn line(&self, name: &str) -> String {
-        let judged = || self.clean.iter().map(|c| &c.judged);
-        let kinds = kinds().map(|kind| of(judged(), |j| j.kind == kind));
-        let inside = [0, 1].map(|k| {
-            let sum = |part: usize| self.clean.iter().map(|c| c.inside[k][part] as usize).sum();
-            share(sum(0), sum(1))
-        });
-        let verified = self.clean.iter().filter_map(|c| c.verified.as_ref());
-        let with_effect: Vec<&WithEffect> = self.with_effect.iter().collect();
-        format!(
-            "| {name} | {} | {} | {} | {} | {} | {} | {} |",
-            self.clean.len().max(self.with_effect.len()),
-            kinds.join(" | "),
-            of(judged(), Judged::is_unobjected),
-            inside.join(" | "),
-            of(verified, Judged::is_unobjected),
-            with_effect.len(),
-            power(&with_effect)
-        )
-    }
+    let worse = with.judged.kind.is_none_or(|kind| kind >= Unexplained);
+    let good = |judged: &Judged| counted(judged.kind == Some(Good));
+    [
+        1.0,
+        with.strength,
+        counted(worse),
+        with.is_right().map_or(f64::NAN, counted),
+        with.verified.as_ref().map_or(f64::NAN, good),
+    ]
 }
 
 /// `sessions` sessions of each kind whose name contains one of `chosen`. A line for each session goes to standard error.
@@ -90,13 +70,11 @@ pub fn run(sessions: u64, chosen: &[&str]) {
     let started = Instant::now();
     let mut kinds = Kind::all();
     kinds.retain(|k| chosen.is_empty() || chosen.iter().any(|c| k.name().contains(c)));
-    println!(
-        "| kind, % | sessions | good | untested | suspect | unexplained | misfit | refused | good or untested | gyro intervals | accelerometer intervals | verified: good or untested | with an effect | {POWER} |\n|---|{}",
-        "---:|".repeat(16)
-    );
-    let mut rows = Vec::new();
+    let columns = CLEAN.map(|c| (c, Figure::Percent)).into_iter().chain(POWER);
+    let mut by_kind = Table::new(&columns.collect::<Vec<_>>());
+    let mut by_effect = Table::new(&POWER);
     for kind in &kinds {
-        let began = Instant::now();
+        let (began, name) = (Instant::now(), kind.name());
         let of = |seed| {
             let clean = kind.clean(seed);
             let with_effect = kind.with_effect(seed, true);
@@ -104,27 +82,24 @@ pub fn run(sessions: u64, chosen: &[&str]) {
             (clean, with_effect)
         };
         let all: Vec<_> = (0..sessions).into_par_iter().map(of).collect();
-        let (clean, with_effect): (_, Vec<_>) = all.into_iter().unzip();
-        let row = Row {
-            clean,
-            with_effect: with_effect.into_iter().flatten().collect(),
-        };
-        eprintln!("# {}: {:.0} s", kind.name(), began.elapsed().as_secs_f64());
-        println!("{}", row.line(&kind.name()));
-        rows.push(row);
+        for (clean, with_effect) in &all {
+            let power = with_effect.as_ref().map_or([f64::NAN; 5], power);
+            by_kind.add(&name, &[&of_clean(clean)[..], &power].concat());
+            for (sensor, [held, all]) in clean.inside.into_iter().enumerate() {
+                let mut values = [f64::NAN; 15];
+                for k in 0..all {
+                    values[7 + sensor] = counted(k < held);
+                    by_kind.add(&name, &values);
+                }
+            }
+            if let Some(with) = with_effect {
+                by_effect.add(format!("`{}`", with.id), &power);
+            }
+        }
+        eprintln!("# {name}: {:.0} s", began.elapsed().as_secs_f64());
     }
-    let mut by_effect: BTreeMap<&str, Vec<&WithEffect>> = BTreeMap::new();
-    for with_effect in rows.iter().flat_map(|row| &row.with_effect) {
-        let of_effect = by_effect.entry(&with_effect.id).or_default();
-        of_effect.push(with_effect);
-    }
-    println!(
-        "\n| effect, % | sessions | {POWER} |\n|---|{}",
-        "---:|".repeat(5)
-    );
-    for (id, all) in by_effect {
-        println!("| `{id}` | {} | {} |", all.len(), power(&all));
-    }
+    by_kind.print(&format!("{sessions} sessions of each kind, %"));
+    by_effect.print("by effect, %");
     eprintln!("# all: {:.0} s", started.elapsed().as_secs_f64());
 }
 
@@ -158,7 +133,7 @@ pub fn array() {
         }
         let counts = |of: fn(&Pair) -> &Judged| {
             let count = |kind| pairs.iter().filter(|p| of(p).kind == kind).count();
-            kinds().map(|kind| count(kind).to_string()).join(" | ")
+            KINDS.map(|kind| count(kind).to_string()).join(" | ")
         };
         let of_fits = counts(|p| &p.judged);
         let of_files = counts(|p| &p.verified);
@@ -191,7 +166,7 @@ fn told(kind: &Kind, seed: u64, clean: &Clean, with: Option<&WithEffect>) -> Str
             out += &objection(what, judged, good);
         }
         if let Some(found) = &with.found {
-            out += &format!("; diagnosis {} {:?}", found.verdict, found.ids);
+            out += &format!("; diagnosis {} {:?}", found.verdict, found.ids());
         }
     }
     out

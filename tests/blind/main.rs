@@ -16,10 +16,9 @@ mod earth;
 mod judged;
 mod planted;
 
-use std::collections::BTreeMap;
-
 use mimu_rig::effects::specs;
 use mimu_tests::blind::{Case, case_on, is_listed, plan};
+use mimu_tests::study::{Figure, Table, class, counted};
 use rayon::prelude::*;
 
 /// Pairs of effects, in one sensor and in both.
@@ -45,95 +44,92 @@ const CLASSES: [(f64, &str); 5] = [
     (f64::INFINITY, "above 5"),
 ];
 
-/// Results of several cases.
-#[derive(Debug, Clone, Copy, Default)]
-struct Tally {
-    cases: u32,
-    detected: u32,
-    right: u32,
-    /// All effects named, and others besides.
-    more: u32,
-    wrong: u32,
-    missed: u32,
-    /// Right ones whose held-out error with the effects is at most 1.2 times the noise floor.
-    at_floor: u32,
-    /// The same with every fourth dwell held out instead of blocks of time.
-    between: u32,
-    /// Right ones whose held-out error is at most 1.2 times that of the same unit, with the same noise, that lacks the effect.
-    at_clean: u32,
+const LISTED: [&str; 9] = [
+    "cases",
+    "detected",
+    "named right",
+    "right and more",
+    "named wrong",
+    "missed",
+    "right, error after at most 1.2 floors",
+    "the same, every fourth dwell held out",
+    "at most 1.2 times that without the effect",
+];
+
+/// Of a case with listed effects, in the columns [`LISTED`]. `clean`: the same unit with the same noise that lacks them.
+fn of_listed(case: &Case, clean: Option<&Case>) -> [f64; 9] {
+    let (said, ids) = (&case.said, case.said.ids());
+    let all = case.truth.iter().all(|t| ids.contains(&t.as_str()));
+    let right = all && ids.len() == case.truth.len();
+    let missed = !all && said.verdict == "clean";
+    let of = |c: &Case| c.held_out[case.judged as usize];
+    [
+        true,
+        said.verdict != "clean",
+        right,
+        all && !right,
+        // Nothing may be named, while the verdict reports an error.
+        !all && !missed && !ids.is_empty(),
+        missed,
+        right && case.after <= 1.2,
+        right && case.interleaved <= 1.2,
+        right && clean.is_some_and(|c| of(case) <= 1.2 * of(c)),
+    ]
+    .map(counted)
 }
 
-impl Tally {
-    fn add(&mut self, case: &Case, clean: Option<&Case>) {
-        self.cases += 1;
-        let all = case.truth.iter().all(|t| case.found.contains(t));
-        self.detected += u32::from(case.verdict != "clean");
-        match (all, case.found.len() == case.truth.len(), case.verdict) {
-            (true, true, _) => {
-                self.right += 1;
-                self.at_floor += u32::from(case.after <= 1.2);
-                self.between += u32::from(case.interleaved <= 1.2);
-                let of = |c: &Case| c.held_out[case.judged as usize];
-                self.at_clean += u32::from(clean.is_some_and(|c| of(case) <= 1.2 * of(c)));
-            }
-            (true, false, _) => self.more += 1,
-            (false, _, "clean") => self.missed += 1,
-            // Nothing is named, but the verdict reports an error.
-            (false, _, _) if case.found.is_empty() => {}
-            (false, ..) => self.wrong += 1,
-        }
-    }
+const UNLISTED: [&str; 6] = [
+    "cases",
+    "unexplained",
+    "clean",
+    "named rightly",
+    "explained by another effect",
+    "refused",
+];
 
-    fn row(&self, name: &str) -> String {
-        let Self {
-            cases,
-            detected,
-            right,
-            more,
-            wrong,
-            missed,
-            at_floor,
-            between,
-            at_clean,
-        } = self;
-        format!(
-            "| {name} | {cases} | {detected} | {right} | {more} | {wrong} | {missed} | {at_floor} | {between} | {at_clean} |"
-        )
-    }
+/// Of a case with effects on no list, in the columns [`UNLISTED`].
+fn of_unlisted(case: &Case) -> [f64; 6] {
+    let (verdict, ids) = (case.said.verdict, case.said.ids());
+    let right = |f: &&str| case.truth.iter().any(|t| t == f);
+    let wrong = |f: &&str| !f.starts_with("term:") && !right(f);
+    let explained = verdict == "explained";
+    let rightly = explained && !ids.iter().any(wrong) && ids.iter().any(right);
+    [
+        true,
+        verdict == "unexplained",
+        verdict == "clean",
+        rightly,
+        explained && !rightly,
+        verdict == "refused",
+    ]
+    .map(counted)
 }
-
-const HEAD: &str = "| | cases | detected | named right | right and more | named wrong | missed | right, error after at most 1.2 floors | the same, every fourth dwell held out | at most 1.2 times that without the effect |\n|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|";
 
 fn main() {
     let mut args: Vec<String> = std::env::args().skip(1).collect();
-    let in_hands = args.first().is_some_and(|a| a == "by-hand");
-    let planted = args.first().is_some_and(|a| a == "planted");
-    if in_hands || planted {
+    let studies = ["by-hand", "planted", "earth", "judged"];
+    let study = args.first().filter(|a| studies.contains(&a.as_str()));
+    let study = study.cloned().unwrap_or_default();
+    if !study.is_empty() {
         args.remove(0);
     }
-    if args.first().is_some_and(|a| a == "earth") {
-        let runs = args.get(1).and_then(|s| s.parse().ok()).unwrap_or(100);
-        let chosen: Vec<&str> = args.iter().skip(2).map(String::as_str).collect();
-        return earth::run(runs, &chosen);
-    }
-    if args.first().is_some_and(|a| a == "judged") {
-        let chosen: Vec<&str> = args.iter().skip(2).map(String::as_str).collect();
-        if args.get(1).is_some_and(|a| a == "array") {
-            return judged::array();
-        }
-        let sessions = args.get(1).and_then(|s| s.parse().ok()).unwrap_or(100);
-        return judged::run(sessions, &chosen);
-    }
     let number = |k: usize, default| args.get(k).and_then(|s| s.parse().ok()).unwrap_or(default);
-    let (seeds, clean): (u64, u64) = (number(0, 20), number(1, 200));
-    let chosen: Vec<&str> = args.iter().skip(2).map(String::as_str).collect();
-    if planted {
-        let times = args.get(1).and_then(|s| s.parse().ok()).unwrap_or(1.0);
-        return planted::run(number(0, 1), times, &chosen);
+    let chosen =
+        |from: usize| -> Vec<&str> { args.iter().skip(from).map(String::as_str).collect() };
+    match study.as_str() {
+        "earth" => earth::run(number(0, 100), &chosen(1)),
+        "judged" if chosen(0) == ["array"] => judged::array(),
+        "judged" => judged::run(number(0, 100), &chosen(1)),
+        "planted" => {
+            let times = args.get(1).and_then(|s| s.parse().ok()).unwrap_or(1.0);
+            planted::run(number(0, 1), times, &chosen(2));
+        }
+        "by-hand" => by_hand::run(number(0, 20), number(1, 200), &chosen(2)),
+        _ => on_table(number(0, 20), number(1, 200), &chosen(2)),
     }
-    if in_hands {
-        return by_hand::run(seeds, clean, &chosen);
-    }
+}
+
+fn on_table(seeds: u64, clean: u64, chosen: &[&str]) {
     let mut kinds: Vec<Vec<&str>> = specs().map(|s| vec![s.id]).collect();
     kinds.extend(PAIRS.iter().map(|p| p.to_vec()));
     kinds.retain(|ids| chosen.is_empty() || chosen.iter().any(|c| ids.join("+").contains(c)));
@@ -141,81 +137,41 @@ fn main() {
     for ids in &kinds {
         jobs.extend((0..seeds).map(|seed| (ids.clone(), seed)));
     }
-    let cases: Vec<(String, u64, Case)> = jobs
-        .into_par_iter()
-        .map(|(ids, seed)| {
-            let name = ids.join(" + ");
-            let case = case_on(&plan(seed), &ids, seed);
-            if !chosen.is_empty() {
-                println!("{name}, seed {seed}: {case:?}");
-            }
-            (name, seed, case)
-        })
-        .collect();
-    tables(&cases);
-}
-
-fn tables(cases: &[(String, u64, Case)]) {
-    let mut by_kind: BTreeMap<&str, Tally> = BTreeMap::new();
-    let mut by_class = [[Tally::default(); 2]; CLASSES.len()];
-    let mut unlisted: BTreeMap<&str, [u32; 6]> = BTreeMap::new();
-    let mut false_alarms = Vec::new();
-    let mut clean = 0;
-    let without = |seed: u64| cases.iter().find(|c| c.1 == seed && c.2.truth.is_empty());
-    for (name, seed, case) in cases {
-        let without = without(*seed).map(|c| &c.2);
-        if case.truth.is_empty() {
-            clean += 1;
-            if case.verdict != "clean" {
-                false_alarms.push(case);
-            }
-        } else if !case.truth.iter().all(|id| is_listed(id)) {
-            let right = |f: &String| case.truth.contains(f);
-            let wrong = |f: &String| !f.starts_with("term:") && !right(f);
-            let listed = case.found.iter().any(wrong);
-            let count = unlisted.entry(name).or_default();
-            count[0] += 1;
-            count[1] += u32::from(case.verdict == "unexplained");
-            count[2] += u32::from(case.verdict == "clean");
-            let explained = case.verdict == "explained";
-            let rightly = explained && !listed && case.found.iter().any(right);
-            count[3] += u32::from(rightly);
-            count[4] += u32::from(explained && !rightly);
-            count[5] += u32::from(case.verdict == "refused");
-        } else {
-            by_kind.entry(name).or_default().add(case, without);
-            // The weaker effect determines the strength of a pair.
-            let strength = case.strength.iter().copied().fold(f64::INFINITY, f64::min);
-            let class = CLASSES
-                .iter()
-                .position(|c| strength < c.0)
-                .unwrap_or(CLASSES.len() - 1);
-            by_class[class][usize::from(case.truth.len() > 1)].add(case, without);
+    let cases = jobs.into_par_iter().map(|(ids, seed)| {
+        let case = case_on(&plan(seed), &ids, seed);
+        if !chosen.is_empty() {
+            println!("{}, seed {seed}: {case:?}", ids.join(" + "));
         }
-    }
+        (seed, case)
+    });
+    let cases: Vec<(u64, Case)> = cases.collect();
+    let (clean, others): (Vec<_>, Vec<_>) = cases.iter().partition(|c| c.1.truth.is_empty());
+    let alarms = || clean.iter().filter(|c| c.1.said.verdict != "clean");
     println!(
-        "clean units: {} false alarms of {clean}",
-        false_alarms.len()
+        "clean units: {} false alarms of {}",
+        alarms().count(),
+        clean.len()
     );
-    for case in false_alarms {
-        println!("  {case:?}");
-    }
-    for (k, title) in ["one effect", "two effects"].iter().enumerate() {
-        println!("\n{title}, by strength\n\n{HEAD}");
-        for (class, (_, name)) in by_class.iter().zip(CLASSES) {
-            println!("{}", class[k].row(name));
+    alarms().for_each(|(_, case)| println!("  {case:?}"));
+    let listed = || Table::new(&LISTED.map(|c| (c, Figure::Sum)));
+    let (mut by_class, mut by_effect) = ([listed(), listed()], listed());
+    let mut unlisted = Table::new(&UNLISTED.map(|c| (c, Figure::Sum)));
+    for (seed, case) in others {
+        let name = format!("`{}`", case.truth.join(" + "));
+        if !case.truth.iter().all(|id| is_listed(id)) {
+            unlisted.add(name, &of_unlisted(case));
+            continue;
         }
+        let without = clean.iter().find(|c| c.0 == *seed);
+        let values = of_listed(case, without.map(|c| &c.1));
+        by_effect.add(name, &values);
+        // The weaker effect determines the strength of a pair.
+        let strength = case.strength.iter().copied().fold(f64::INFINITY, f64::min);
+        let class = class(strength, &CLASSES).unwrap_or("refused");
+        by_class[usize::from(case.truth.len() > 1)].add(class, &values);
     }
-    println!("\nby effect\n\n{HEAD}");
-    for (name, tally) in &by_kind {
-        println!("{}", tally.row(&format!("`{name}`")));
-    }
-    println!(
-        "\neffects on no list\n\n| | cases | unexplained | clean | named rightly | explained by another effect | refused |\n|---|---:|---:|---:|---:|---:|---:|"
-    );
-    for (name, [cases, unexplained, missed, rightly, passed, refused]) in &unlisted {
-        println!(
-            "| `{name}` | {cases} | {unexplained} | {missed} | {rightly} | {passed} | {refused} |"
-        );
-    }
+    by_class[0].print("one effect, by strength");
+    by_class[1].print("two effects, by strength");
+    by_effect.print("by effect");
+    unlisted.print("effects on no list");
 }

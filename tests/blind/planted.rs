@@ -1,11 +1,10 @@
 //! Effects planted in recordings by other people.
 
-use std::collections::BTreeMap;
-
 use mimu::quantity::Sensor;
 use mimu_rig::effects::specs;
 use mimu_tests::blind::is_listed;
 use mimu_tests::planted::{Ground, Outcome, Planting, Untouched, grounds};
+use mimu_tests::study::{Figure, Table, class, counted};
 use rayon::prelude::*;
 
 /// Classes of strength in the tables: size of the effect over the predicted standard deviation of its coefficients.
@@ -16,63 +15,42 @@ const CLASSES: [(f64, &str); 4] = [
     (f64::INFINITY, "above 10"),
 ];
 
-#[derive(Debug, Clone, Default)]
-struct Tally {
-    plantings: u32,
-    outcomes: BTreeMap<Outcome, u32>,
-    /// Named without another effect beside it.
-    alone: u32,
-    /// Of named ones: what remains of the planted error with the effects, over what remains after the affine calibration.
-    ratios: Vec<f64>,
-    /// Effects named that are not there.
-    not_there: u32,
-    strengths: Vec<f64>,
-}
+const COLUMNS: [&str; 9] = [
+    "plantings",
+    "named",
+    "named alone",
+    "`unexplained`",
+    "another named, `unexplained`",
+    "another named, `explained`",
+    "missed",
+    "refused",
+    "effects named that are not there",
+];
 
-impl Tally {
-    fn add(&mut self, planting: &Planting) {
-        self.plantings += 1;
-        let outcome = planting.outcome();
-        *self.outcomes.entry(outcome).or_default() += 1;
-        let named = outcome == Outcome::Named;
-        let not_there = planting.not_there().count() as u32;
-        self.alone += u32::from(named && not_there == 0);
+/// In the columns [`COLUMNS`], then the strength, and of a named effect what remains of its error with the effects over what remains after the affine
+/// calibration.
+fn values(p: &Planting) -> [f64; 11] {
+    let (outcome, others) = (p.outcome(), p.not_there().count());
+    let is = |of| counted(outcome == of);
+    let named = outcome == Outcome::Named;
+    [
+        1.0,
+        counted(named),
+        counted(named && others == 0),
+        is(Outcome::Unexplained),
+        is(Outcome::AnotherAndUnexplained),
+        is(Outcome::NamedWrong),
+        is(Outcome::Missed),
+        is(Outcome::Refused),
+        others as f64,
+        p.strength,
         if named {
-            self.ratios.push(planting.errors[2] / planting.errors[1]);
-        }
-        self.not_there += not_there;
-        self.strengths.push(planting.strength);
-    }
-
-    fn row(&self, name: &str) -> String {
-        let of = |outcome| self.outcomes.get(&outcome).copied().unwrap_or(0);
-        let figures = [
-            self.plantings,
-            of(Outcome::Named),
-            self.alone,
-            of(Outcome::Unexplained),
-            of(Outcome::AnotherAndUnexplained),
-            of(Outcome::NamedWrong),
-            of(Outcome::Missed),
-            of(Outcome::Refused),
-            self.not_there,
-        ];
-        let figures = figures.map(|n| n.to_string()).join(" | ");
-        let [strength, ratio] = [&self.strengths, &self.ratios].map(|all| match median(all) {
-            Some(m) => format!("{m:.2}"),
-            None => "-".into(),
-        });
-        format!("| {name} | {figures} | {strength} | {ratio} |")
-    }
+            p.errors[2] / p.errors[1]
+        } else {
+            f64::NAN
+        },
+    ]
 }
-
-pub(super) fn median(values: &[f64]) -> Option<f64> {
-    let mut sorted: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
-    sorted.sort_by(f64::total_cmp);
-    sorted.get(sorted.len() / 2).copied()
-}
-
-const HEAD: &str = "| | plantings | named | named alone | `unexplained` | another named, `unexplained` | another named, `explained` | missed | refused | effects named that are not there | strength, median | error with effects over affine, median of the named |\n|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|";
 
 /// Plants each effect `seeds` times at `times` the size of data sheets. `chosen` are parts of the names of effects or recordings.
 pub fn run(seeds: u64, times: f64, chosen: &[&str]) {
@@ -91,17 +69,11 @@ pub fn run(seeds: u64, times: f64, chosen: &[&str]) {
         .collect();
     println!("| untouched | verdict | named | with the made thermometer |\n|---|---|---|---|");
     for (ground, [plain, heated]) in grounds.iter().zip(&untouched) {
-        let found = |u: &Untouched| match u.found.is_empty() {
-            true => "-".to_owned(),
-            false => u.found.join(", "),
-        };
+        let [plain, heated] = [plain, heated].map(|u| (u.said.verdict, u.said.ids().join(", ")));
+        let name = &ground.name;
         println!(
-            "| {} | {} | {} | {}: {} |",
-            ground.name,
-            plain.verdict,
-            found(plain),
-            heated.verdict,
-            found(heated)
+            "| {name} | {} | {} | {}: {} |",
+            plain.0, plain.1, heated.0, heated.1
         );
     }
     // Each effect in one recording first, then in the next one, so that a run that is ended early has tried all effects.
@@ -113,7 +85,7 @@ pub fn run(seeds: u64, times: f64, chosen: &[&str]) {
                 let which = (turn + k) % grounds.len();
                 let ground = &grounds[which];
                 let reference = &untouched[which][usize::from(id.contains("thermal"))];
-                let has_it = reference.found.iter().any(|f| f == id);
+                let has_it = reference.said.ids().contains(id);
                 if is_chosen(ground, id) && ground.takes(id) && !has_it {
                     jobs.push((ground, reference, *id, seed));
                 }
@@ -148,7 +120,7 @@ fn row(p: &Planting) -> String {
         Sensor::Accel => ("mm/s²", 1e3),
     };
     let [planted, before, after] = p.errors.map(|e| format!("{:.3}", factor * e));
-    let found = p.found.iter().map(|f| f.join(" or "));
+    let found = p.said.found.iter().map(|f| f.join(" or "));
     let found = found.collect::<Vec<_>>().join(", ");
     format!(
         "| {} | `{}` | {:.1} | {:?} | {} | {found} | {planted} {unit} | {before} | {after} | {} |",
@@ -156,38 +128,30 @@ fn row(p: &Planting) -> String {
         p.truth,
         p.strength,
         p.outcome(),
-        p.verdict,
-        p.reasons.join("; "),
+        p.said.verdict,
+        p.said.reasons.join("; "),
     )
 }
 
 fn tables(plantings: &[Planting]) {
+    let mut columns = COLUMNS.map(|c| (c, Figure::Sum)).to_vec();
+    columns.push(("strength, median", Figure::Median));
+    columns.push((
+        "error with effects over affine, median of the named",
+        Figure::Median,
+    ));
     for (title, listed) in [("listed effects", true), ("effects on no list", false)] {
-        let of = || plantings.iter().filter(|p| is_listed(p.truth) == listed);
-        let mut by_class = vec![Tally::default(); CLASSES.len()];
-        let mut by_effect: BTreeMap<&str, Tally> = BTreeMap::new();
-        let mut all = Tally::default();
-        for planting in of() {
+        let (mut by_class, mut by_effect) = (Table::new(&columns), Table::new(&columns));
+        for planting in plantings.iter().filter(|p| is_listed(p.truth) == listed) {
+            let values = values(planting);
+            by_class.add("all", &values);
             // That of a refused recording is not a number.
-            if let Some(class) = CLASSES.iter().position(|c| planting.strength < c.0) {
-                by_class[class].add(planting);
+            if let Some(class) = class(planting.strength, &CLASSES) {
+                by_class.add(class, &values);
             }
-            by_effect.entry(planting.truth).or_default().add(planting);
-            all.add(planting);
+            by_effect.add(format!("`{}`", planting.truth), &values);
         }
-        if all.plantings == 0 {
-            continue;
-        }
-        println!("\n{title}, by strength\n\n{HEAD}");
-        for (tally, (_, name)) in by_class.iter().zip(CLASSES) {
-            if tally.plantings > 0 {
-                println!("{}", tally.row(name));
-            }
-        }
-        println!("{}", all.row("all"));
-        println!("\n{title}, by effect\n\n{HEAD}");
-        for (id, tally) in &by_effect {
-            println!("{}", tally.row(&format!("`{id}`")));
-        }
+        by_class.print(&format!("{title}, by strength"));
+        by_effect.print(&format!("{title}, by effect"));
     }
 }

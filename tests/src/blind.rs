@@ -21,6 +21,7 @@ use mimu_rig::rig_file::{EffectFile, RigFile, RigTruth};
 use nalgebra::{DMatrix, DVector};
 
 use crate::bench;
+use crate::study::Said;
 
 /// Plan of half an hour on a table in a chamber: faces, edges, corners and eight rates about each axis, all twice, in random order by the seed, while
 /// the chamber warms by 15 °C and cools again.
@@ -133,10 +134,8 @@ pub struct Case {
     pub truth: Vec<String>,
     /// For each effect, the rms of its residuals in the dwell means after an affine fit, over the noise floor.
     pub strength: Vec<f64>,
-    /// Accepted effects.
-    pub found: Vec<String>,
-    /// Verdict, or `refused`.
-    pub verdict: &'static str,
+    /// What the diagnosis says.
+    pub said: Said,
     /// Sensor of the first effect.
     pub judged: Sensor,
     /// Its held-out error with the effects, over the noise floor.
@@ -145,10 +144,6 @@ pub struct Case {
     pub interleaved: f64,
     /// Held-out error with the effects, of gyro and accelerometer, SI.
     pub held_out: [f64; 2],
-    /// Effects that were found but not accepted, with the reasons.
-    pub rejected: Vec<String>,
-    /// Remaining errors, in words.
-    pub left: Vec<String>,
 }
 
 /// Rms of the difference between two recordings after an affine model, over the noise floor, for the sensor where it is larger.
@@ -254,59 +249,21 @@ pub fn case_on(plan: &str, ids: &[&str], seed: u64) -> Case {
     }
     let noise = bench::noise_file(&file, seed, with.condensed.period_s);
     let with = with.with_noise(&noise).expect("its noise");
-    let truth: Vec<String> = ids.iter().map(|id| (*id).into()).collect();
-    let found: Diagnosis = match diagnose(with.into(), Options::IN_SAMPLE) {
-        Ok(found) => found,
-        // If an error is so large that the readings no longer follow their inputs, the recording is refused before the diagnosis.
-        Err(refusal) => {
-            return Case {
-                truth,
-                strength: strengths,
-                found: Vec::new(),
-                verdict: "refused",
-                judged: sensors.first().copied().unwrap_or(Sensor::Gyro),
-                after: f64::NAN,
-                interleaved: f64::NAN,
-                held_out: [f64::NAN; 2],
-                rejected: Vec::new(),
-                left: vec![refusal.to_string()],
-            };
-        }
-    };
-    let found = reported(found);
+    let found = diagnose(with.into(), Options::IN_SAMPLE).map(reported);
     let judged = sensors.first().copied().unwrap_or(Sensor::Gyro);
-    let of = |sensor: Sensor| found.sensors.iter().find(|s| s.sensor == sensor);
-    let held_out = |s| of(s).map_or(f64::NAN, |s| s.decision.held_out_rms[1]);
+    let of = |sensor: Sensor| {
+        let all = &found.as_ref().ok()?.sensors;
+        Some(&all.iter().find(|s| s.sensor == sensor)?.decision)
+    };
+    let held_out = |s| of(s).map_or(f64::NAN, |d| d.held_out_rms[1]);
+    let floor = of(judged).map_or(f64::NAN, |d| d.noise_floor);
     Case {
-        truth,
+        truth: ids.iter().map(|id| (*id).into()).collect(),
         strength: strengths,
-        found: found.effects.iter().map(|e| e.candidate.id()).collect(),
-        verdict: found.verdict.name(),
+        said: Said::of(&found),
         judged,
-        after: of(judged).map_or(f64::NAN, |s| {
-            s.decision.held_out_rms[1] / s.decision.noise_floor
-        }),
-        interleaved: of(judged).map_or(f64::NAN, |s| {
-            s.decision.interleaved_rms / s.decision.noise_floor
-        }),
+        after: held_out(judged) / floor,
+        interleaved: of(judged).map_or(f64::NAN, |d| d.interleaved_rms) / floor,
         held_out: Sensor::BOTH.map(held_out),
-        rejected: found
-            .sensors
-            .iter()
-            .flat_map(|s| s.decision.rejected.clone())
-            .map(|r| format!("{}: {}", r.id, r.reason))
-            .collect(),
-        left: found
-            .sensors
-            .iter()
-            .flat_map(|s| {
-                s.decision.leftover.iter().map(move |l| {
-                    format!(
-                        "{}_{}: {} {:.2e}",
-                        s.sensor, l.stratum, l.against, l.strength
-                    )
-                })
-            })
-            .collect(),
     }
 }

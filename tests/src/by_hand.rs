@@ -3,7 +3,7 @@
 //! The bench makes the truth. The judgement covers the output for the user: which effects, which verdict, and whether the intervals contain the
 //! truth.
 
-use mimu::diagnose::{Diagnosis, diagnose};
+use mimu::diagnose::diagnose;
 use mimu::fit::{Fit, Options, fit};
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
@@ -15,6 +15,7 @@ use nalgebra::SVector;
 
 use crate::bench;
 use crate::blind::{reported, with_effects};
+use crate::study::Said;
 
 /// Effects that a few minutes by hand can show: hands have no steady rate, and the temperature does not go up and down.
 #[rustfmt::skip]
@@ -52,14 +53,10 @@ pub struct Case {
     pub flawed: bool,
     /// Rms that the weakest effect leaves after the affine fit, over the noise.
     pub strength: f64,
-    /// Accepted effects, each with those that the recording does not distinguish from it.
-    pub found: Vec<Vec<String>>,
-    /// Verdict, or `refused`.
-    pub verdict: &'static str,
+    /// What the diagnosis says.
+    pub said: Said,
     /// Number of parameters of C and o inside their intervals, and number of all, of gyro and accelerometer.
     pub inside: [[u32; 2]; 2],
-    /// Remaining errors, or the reason of the refusal, in words.
-    pub left: Vec<String>,
 }
 
 impl Case {
@@ -70,7 +67,8 @@ impl Case {
 
     /// Whether exactly the effects of the unit are named.
     pub fn is_named_alone(&self) -> bool {
-        self.found.len() == self.truth.len() && self.found.iter().all(|f| self.is_right(f))
+        self.said.found.len() == self.truth.len()
+            && self.said.found.iter().all(|f| self.is_right(f))
     }
 
     /// Whether the verdict is correct for the effects of the unit.
@@ -80,7 +78,7 @@ impl Case {
         } else {
             "explained"
         };
-        self.verdict == right
+        self.said.verdict == right
     }
 }
 
@@ -251,57 +249,27 @@ pub(crate) fn case_of(
         }
         truth
     });
-    let case = |found, verdict, inside, left| Case {
+    let diagnosis = diagnose(with.into(), Options::IN_SAMPLE).map(reported);
+    let mut case = Case {
         truth: ids.to_vec(),
         grade,
         flawed,
         strength,
-        found,
-        verdict,
-        inside,
-        left,
+        said: Said::of(&diagnosis),
+        inside: [[0; 2]; 2],
     };
-    let diagnosis: Diagnosis = match diagnose(with.into(), Options::IN_SAMPLE) {
-        Ok(diagnosis) => reported(diagnosis),
-        Err(refusal) => {
-            return case(
-                Vec::new(),
-                "refused",
-                [[0; 2]; 2],
-                vec![refusal.to_string()],
-            );
-        }
+    let Ok(diagnosis) = diagnosis else {
+        return case;
     };
-    let left = diagnosis.sensors.iter().flat_map(|s| {
-        let left = s.decision.leftover.iter().map(move |l| {
-            let usual = if l.usual { ", usual" } else { "" };
-            format!(
-                "{}_{}: {} {:.2e}{usual}",
-                s.sensor, l.stratum, l.against, l.strength
-            )
-        });
-        let undecided = s.decision.undecided.iter();
-        left.chain(undecided.map(|u| format!("{}: {} {:.1}", u.id, u.law, u.difference)))
-    });
-    let accepted = || diagnosis.sensors.iter().flat_map(|s| &s.decision.accepted);
+    let accepted = diagnosis.sensors.iter().flat_map(|s| &s.decision.accepted);
     // A bias is defined where its effect is zero: at 25 °C for an effect of temperature, after settling for a warm-up. If a rival was accepted that
     // the recording does not distinguish from the true effect, its bias is a different quantity and is not judged.
-    for a in accepted().filter(|a| a.chosen.candidate.is_slow_bias()) {
+    for a in accepted.filter(|a| a.chosen.candidate.is_slow_bias()) {
         if ids.iter().all(|id| *id != a.chosen.candidate.id()) {
             let k = usize::from(a.chosen.candidate.sensor == Sensor::Accel);
             truths[k].fixed_rows_mut::<3>(9).fill(f64::NAN);
         }
     }
-    let found = accepted().map(|a| {
-        let alike = a.chosen.alternatives.iter().map(|other| other.id.clone());
-        std::iter::once(a.chosen.candidate.id())
-            .chain(alike)
-            .collect()
-    });
-    case(
-        found.collect(),
-        diagnosis.verdict.name(),
-        inside(triads(&diagnosis.after), &truths, true),
-        left.collect(),
-    )
+    case.inside = inside(triads(&diagnosis.after), &truths, true);
+    case
 }

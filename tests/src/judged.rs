@@ -27,6 +27,7 @@ use crate::coverage::of_the_session;
 use crate::planted::{Ground, array};
 use crate::ramp;
 use crate::sessions::{self, ARRAY_SESSIONS, Life};
+use crate::study::Said;
 use crate::whole_turns;
 
 /// Rms that the affine fit leaves of an effect, over the noise of a dwell mean or turn.
@@ -374,7 +375,12 @@ impl Kind {
         let (effect, strength) = self.planted(seed)?;
         let effects = std::slice::from_ref(&effect);
         let recordings = self.all_recorded(effects, seed);
-        let found = diagnosed.then(|| Found::of(recordings.clone(), &effect.id));
+        let found = diagnosed.then(|| {
+            let mut all = recordings.clone();
+            let first = Recordings::from(all.remove(0));
+            let all = Recordings { more: all, ..first };
+            Said::of(&diagnose(all, Options::IN_SAMPLE))
+        });
         let (judged, verified) = match self.calibrated(recordings) {
             Ok(calibrated) => {
                 let second = self.recorded(effects, seed, SECOND);
@@ -529,45 +535,13 @@ pub struct WithEffect {
     /// Of that calibration on the second recording; `None` without a calibration.
     pub verified: Option<Judged>,
     /// Of the diagnosis, if it was asked.
-    pub found: Option<Found>,
+    pub found: Option<Said>,
 }
 
-/// What a diagnosis found.
-#[derive(Debug, Clone)]
-pub struct Found {
-    /// Whether the verdict is `explained`, and the effect of the unit is accepted, perhaps as one that the recording does not distinguish from another.
-    pub is_right: bool,
-    /// Verdict, or `refused`.
-    pub verdict: &'static str,
-    /// Accepted effects.
-    pub ids: Vec<String>,
-}
-
-impl Found {
-    fn of(mut recordings: Vec<Prepared>, id: &str) -> Self {
-        let first = recordings.remove(0);
-        let all = Recordings {
-            more: recordings,
-            ..Recordings::from(first)
-        };
-        let Ok(diagnosis) = diagnose(all, Options::IN_SAMPLE) else {
-            return Self {
-                is_right: false,
-                verdict: "refused",
-                ids: Vec::new(),
-            };
-        };
-        let accepted = diagnosis.sensors.iter().flat_map(|s| &s.decision.accepted);
-        let mut named = false;
-        for accepted in accepted {
-            let alike = &accepted.chosen.alternatives;
-            named |= accepted.chosen.candidate.id() == id || alike.iter().any(|a| a.id == id);
-        }
-        let verdict = diagnosis.verdict.name();
-        Self {
-            is_right: named && verdict == "explained",
-            verdict,
-            ids: diagnosis.effects.iter().map(|e| e.candidate.id()).collect(),
-        }
+impl WithEffect {
+    /// Whether the diagnosis, if it was asked, explains the data by the effect, perhaps as one that the recording does not distinguish from another.
+    pub fn is_right(&self) -> Option<bool> {
+        let found = self.found.as_ref()?;
+        Some(found.names(&self.id) && found.verdict == "explained")
     }
 }

@@ -4,6 +4,7 @@
 //! |------------------------|-------------------------------------------------------------------|
 //! | [`mod@bench`]          | units with known truth on the virtual bench, read as a user's would be |
 //! | [`blind`], [`by_hand`] | units with undeclared effects, on a table and by hand             |
+//! | [`study`]            | what a diagnosis says, and tables of many cases                   |
 //! | [`judged`]             | judgements of clean sessions and of sessions with an effect of known strength |
 //! | [`sessions`]           | several sessions of one unit, and one that they predict           |
 //! | [`fleet`] | units of one population, and the prior of it                  |
@@ -44,6 +45,7 @@ pub mod sessions;
 pub mod slow_bias;
 pub mod spinner;
 pub mod stored_calibration;
+pub mod study;
 pub mod text_board;
 pub mod whole_turns;
 

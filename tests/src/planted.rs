@@ -30,6 +30,7 @@ use tempfile::TempDir;
 
 use crate::recordings::{Foreign, mikoff_session, xsens_session};
 use crate::sessions::of_array_recorded;
+use crate::study::Said;
 
 /// Made course of the temperature: it rises and falls by this much, K, in half a sine over the session. The recordings have no thermometer, and their
 /// units are as warm as they were; only the planted error follows the course.
@@ -71,10 +72,8 @@ pub struct Ground {
 #[derive(Debug)]
 pub struct Untouched {
     diagnosis: Diagnosis,
-    /// Accepted effects.
-    pub found: Vec<String>,
-    /// Verdict.
-    pub verdict: &'static str,
+    /// What it says.
+    pub said: Said,
 }
 
 /// One planted effect, and what the diagnosis says.
@@ -88,16 +87,12 @@ pub struct Planting {
     pub sensor: Sensor,
     /// Size of the effect over the predicted standard deviation of its coefficients, rms over these: what the recording can carry.
     pub strength: f64,
-    /// Accepted effects beside those of the untouched recording, each with those that the recording does not distinguish from it.
-    pub found: Vec<Vec<String>>,
-    /// Verdict, or `refused`.
-    pub verdict: &'static str,
+    /// What the diagnosis says: of the effects, those beside the ones of the untouched recording.
+    pub said: Said,
     /// Verdict on the untouched recording.
     pub verdict_untouched: &'static str,
     /// Rms of the planted error, of what remains of it after the affine calibration, and after that with the effects found; SI.
     pub errors: [f64; 3],
-    /// Why the effect was not accepted, or what remains, in words.
-    pub reasons: Vec<String>,
 }
 
 /// What became of a planting.
@@ -120,26 +115,22 @@ pub enum Outcome {
 impl Planting {
     /// What became of it.
     pub fn outcome(&self) -> Outcome {
-        let right = |f: &Vec<String>| f.iter().any(|f| f == self.truth);
-        let listed = |f: &Vec<String>| !f[0].starts_with("term:");
-        match () {
-            () if self.verdict == "refused" => Outcome::Refused,
-            () if self.found.iter().any(right) => Outcome::Named,
-            () if self.found.iter().any(listed) && self.verdict == "unexplained" => {
-                Outcome::AnotherAndUnexplained
-            }
-            () if self.found.iter().any(listed) => Outcome::NamedWrong,
-            () if self.verdict == "unexplained" && self.verdict_untouched != "unexplained" => {
-                Outcome::Unexplained
-            }
-            () => Outcome::Missed,
+        let said = &self.said;
+        let another = said.ids().iter().any(|id| !id.starts_with("term:"));
+        match said.verdict {
+            "refused" => Outcome::Refused,
+            _ if said.names(self.truth) => Outcome::Named,
+            "unexplained" if another => Outcome::AnotherAndUnexplained,
+            _ if another => Outcome::NamedWrong,
+            "unexplained" if self.verdict_untouched != "unexplained" => Outcome::Unexplained,
+            _ => Outcome::Missed,
         }
     }
 
     /// Effects that are named although they were not planted.
     pub fn not_there(&self) -> impl Iterator<Item = &str> {
         let wrong = |f: &&Vec<String>| !f.iter().any(|f| f == self.truth);
-        self.found.iter().filter(wrong).map(|f| f[0].as_str())
+        self.said.found.iter().filter(wrong).map(|f| f[0].as_str())
     }
 }
 
@@ -377,11 +368,10 @@ impl Ground {
     /// # Errors
     /// The recording is refused.
     pub fn untouched(&self, heated: bool) -> Result<Untouched> {
-        let diagnosis = self.diagnose(self.samples.clone(), heated)?;
+        let diagnosis = self.diagnose(self.samples.clone(), heated);
         Ok(Untouched {
-            found: diagnosis.effects.iter().map(|e| e.id()).collect(),
-            verdict: diagnosis.verdict.name(),
-            diagnosis,
+            said: Said::of(&diagnosis),
+            diagnosis: diagnosis?,
         })
     }
 
@@ -414,25 +404,20 @@ impl Ground {
             let k = usize::from(accel);
             (Sensor::BOTH[k], errors[k], strengths[k] / numbers.sqrt())
         };
+        let diagnosis = self.diagnose(samples, id.contains("thermal"));
         let mut planting = Planting {
             ground: self.name.clone(),
             truth: effect.id,
             sensor: Sensor::Gyro,
             strength: f64::NAN,
-            found: Vec::new(),
-            verdict: "refused",
-            verdict_untouched: untouched.verdict,
+            said: Said::of(&diagnosis),
+            verdict_untouched: untouched.said.verdict,
             errors: [f64::NAN; 3],
-            reasons: Vec::new(),
         };
-        let diagnosis = match self.diagnose(samples, id.contains("thermal")) {
-            Ok(diagnosis) => diagnosis,
-            Err(refusal) => {
-                let errors = increments.map(|i| [i, f64::NAN, f64::NAN]);
-                (planting.sensor, planting.errors, _) = of_both(errors, increments);
-                planting.reasons = vec![refusal.to_string()];
-                return Some(planting);
-            }
+        let Ok(diagnosis) = diagnosis else {
+            let errors = increments.map(|i| [i, f64::NAN, f64::NAN]);
+            (planting.sensor, planting.errors, _) = of_both(errors, increments);
+            return Some(planting);
         };
         let reference = &untouched.diagnosis;
         let errors = [0, 1].map(|k| {
@@ -446,17 +431,11 @@ impl Ground {
         let strengths =
             Sensor::BOTH.map(|s| noncentrality(&diagnosis.before, &reference.before, s).sqrt());
         (planting.sensor, planting.errors, planting.strength) = of_both(errors, strengths);
-        planting.verdict = diagnosis.verdict.name();
-        let accepted = || diagnosis.sensors.iter().flat_map(|s| &s.decision.accepted);
-        let new = accepted().filter(|a| !untouched.found.contains(&a.chosen.candidate.id()));
-        planting.found = new
-            .map(|a| {
-                let alike = a.chosen.alternatives.iter().map(|other| other.id.clone());
-                let one = a.chosen.candidate.id();
-                std::iter::once(one).chain(alike).collect()
-            })
-            .collect();
-        planting.reasons = reasons(&diagnosis, id);
+        let known = untouched.said.ids();
+        planting
+            .said
+            .found
+            .retain(|f| !known.contains(&f[0].as_str()));
         Some(planting)
     }
 
@@ -480,27 +459,6 @@ fn coefficients(id: &str) -> f64 {
         Shape::Cross => 6.0,
         shape => shape.numbers() as f64,
     }
-}
-
-/// Why `id` was not accepted, and what remains.
-fn reasons(diagnosis: &Diagnosis, id: &str) -> Vec<String> {
-    let mut reasons = Vec::new();
-    for sensor in &diagnosis.sensors {
-        let decision = &sensor.decision;
-        let rejected = decision.rejected.iter().filter(|r| r.id == id);
-        reasons.extend(rejected.map(|r| format!("{}: {}", r.id, r.reason)));
-        let left = decision.leftover.iter().map(|l| {
-            let usual = if l.usual { " (usual)" } else { "" };
-            format!(
-                "{}_{} against {} {:.2e}{usual}",
-                sensor.sensor, l.stratum, l.against, l.strength
-            )
-        });
-        reasons.extend(left);
-        let undecided = decision.undecided.iter();
-        reasons.extend(undecided.map(|u| format!("{} or {}", u.id, u.law)));
-    }
-    reasons
 }
 
 /// Rms of the difference between the calibrated readings of two recordings of the same motion over all blocks, SI: what remains of the error that one

@@ -282,23 +282,6 @@ impl Samples {
         let sum: Vector3<f64> = self.accel[dwell.clone()].iter().sum();
         accel.apply(&(sum / dwell.len() as f64))
     }
-
-    /// Angle (rad) between the direction of gravity propagated through each turn and the direction measured after it.
-    pub fn direction_errors(
-        &self,
-        dwells: &[std::ops::Range<usize>],
-        accel: &Affine<f64>,
-        gyro: &Affine<f64>,
-    ) -> Vec<f64> {
-        let turns = dwells.windows(2);
-        turns
-            .map(|pair| {
-                let turn = self.rotation(gyro, pair[0].end - 1, pair[1].start);
-                let predicted = turn.inverse() * self.force(accel, &pair[0]);
-                predicted.angle(&self.force(accel, &pair[1]))
-            })
-            .collect()
-    }
 }
 
 /// Result of `mimu verify` for a calibration by other people.

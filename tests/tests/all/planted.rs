@@ -9,7 +9,7 @@ fn effects_planted_in_a_real_recording_are_named_alone_and_mostly_removed() {
         return;
     };
     let untouched = ground.untouched(false).expect("a diagnosis");
-    assert!(untouched.found.is_empty(), "{:?}", untouched.found);
+    assert!(untouched.said.found.is_empty(), "{:?}", untouched.said);
     for id in ["gyro_g_sensitivity", "accel_scale_quadratic"] {
         let planted = ground.plant(id, 1.0, 0, &untouched).expect("it shows");
         assert_eq!(planted.outcome(), Outcome::Named, "{planted:?}");

@@ -89,7 +89,7 @@ fn g_sensitivity_and_what_differs_between_the_arms_of_the_axes_are_named_beside_
 #[ignore = "nightly: a plan of half an hour"]
 fn noise_of_blocks_makes_no_effect_of_a_clean_unit_whose_inputs_turn() {
     let case = case_on(&turning_plan(0), &[], 0);
-    assert_eq!(case.verdict, "clean", "{case:?}");
+    assert_eq!(case.said.verdict, "clean", "{case:?}");
 }
 
 #[test]
