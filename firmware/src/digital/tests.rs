@@ -276,27 +276,3 @@ fn a_chip_that_was_gone_is_started_again_and_the_numbers_go_on_by_the_crystal() 
     assert!(all.windows(2).all(|pair| pair[1].tick_us > pair[0].tick_us));
     assert!((f64::from(after.period_ns) / period_us - 1000.0).abs() < 0.2);
 }
-
-#[test]
-fn the_temperature_is_that_of_the_die_and_flagged_where_the_chip_has_none() {
-    let mut source = Digital::<Icm42688p<()>>::new(&FrontEnd::default());
-    assert_eq!(
-        (source.temp_c(), source.has_known_temperature()),
-        (25.0, false)
-    );
-    // 132.48 counts per °C from 25 °C.
-    for _ in 0..500 {
-        source.update(
-            &DieSum {
-                total: 20 * 1325,
-                valid: 20,
-            },
-            20,
-        );
-    }
-    assert!((source.temp_c() - 35.0).abs() < 0.01, "{}", source.temp_c());
-    assert_eq!(source.flags(), 0);
-    source.update(&DieSum::default(), 20);
-    assert_eq!(source.flags(), flags::NO_TEMPERATURE);
-    assert!((source.temp_c() - 35.0).abs() < 0.01);
-}

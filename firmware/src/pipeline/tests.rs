@@ -164,23 +164,6 @@ fn a_gap_ends_the_batch_and_is_counted() {
 }
 
 #[test]
-fn batches_without_room_are_counted_and_the_next_says_so() {
-    let mut pipeline = Pipeline::<Analog>::new(&FrontEnd::default());
-    pipeline.calibrate(calibration(&[]));
-    pipeline.stream(both());
-    for number in 0..40 {
-        pipeline.take(&scan(number.into(), &sums(number)), &mut |_| false);
-    }
-    assert_eq!(pipeline.losses().batches, 4);
-    let sent = run(&mut pipeline, 40..60);
-    let Sent::Raw(head, ..) = &sent[0] else {
-        panic!("{sent:?}")
-    };
-    // The head was written when the batch began.
-    assert_eq!((head.samples_lost, head.batches_dropped), (0, 4));
-}
-
-#[test]
 fn compensated_samples_are_those_of_the_raw_ones_at_the_stated_temperature() {
     let mut pipeline = Pipeline::<Analog>::new(&FrontEnd::default());
     pipeline.calibrate(calibration(&[]));
@@ -226,22 +209,6 @@ fn heads(
         });
     }
     heads
-}
-
-#[test]
-fn flags_of_others_are_in_the_batch_that_has_them() {
-    let mut pipeline = Pipeline::<Analog>::new(&FrontEnd::default());
-    pipeline.stream(Streams {
-        raw: true,
-        compensated: false,
-    });
-    let mut flags_of = Vec::new();
-    for number in 0..60 {
-        pipeline.flag(flags::SELF_TEST, (45..50).contains(&number));
-        let of = heads(&mut pipeline, number..number + 1, |_, _| ());
-        flags_of.extend(of.iter().map(|head| head.flags));
-    }
-    assert_eq!(flags_of, [0, 0, flags::SELF_TEST]);
 }
 
 /// The outputs end 0.25 V from the sensors' own supplies, 5 and 3.3 V, which the converter reads as anything but its ends.
@@ -328,42 +295,6 @@ fn a_warm_up_goes_by_the_time_since_power_on_and_is_over_where_that_is_unknown()
         assert!((gone - 0.5 * share).abs() < 1e-3, "{ms}: {gone}");
     }
     assert_eq!(left(None), (flags::POWER_ON_UNKNOWN, 0.0));
-}
-
-/// Numbers of samples wrap after 49.7 days of 1 kHz; the time since power-on does not.
-#[test]
-fn a_first_calibration_after_49_days_does_not_see_the_unit_just_switched_on() {
-    const WRAP: u64 = 1 << 32;
-    let warm_up = DeviceEffect::named("gyro_warm_up", &[0.5; 3], Some(100.0)).unwrap();
-    let first = |begin: u64, effects: &[DeviceEffect<f32>]| {
-        let mut pipeline = Pipeline::<Analog>::new(&FrontEnd::default());
-        pipeline.calibrate(calibration(effects));
-        pipeline.stream(both());
-        let mut all = Vec::new();
-        for number in begin..begin + 40 {
-            pipeline.take(&scan(number, &sums(number as u32)), &mut |message| {
-                all.push(keep(message));
-                true
-            });
-        }
-        let seen = all.into_iter().filter_map(|sent| match sent {
-            Sent::Compensated(head, samples, _) => Some((head, samples[0].1.gyro.x)),
-            _ => None,
-        });
-        seen.collect::<Vec<_>>()
-    };
-    let warm = [core::slice::from_ref(&warm_up), &[]];
-    // Just after the wrap, and across it.
-    for begin in [WRAP + 5, WRAP - 20] {
-        let [with, without] = warm.map(|effects| first(begin, effects));
-        assert_eq!(with, without);
-        for (k, (head, _)) in with.iter().enumerate() {
-            let number = begin + 20 * k as u64;
-            assert_eq!((head.first, head.tick_us), (number as u32, number * 1000));
-        }
-    }
-    let [with, without] = warm.map(|effects| first(0, effects));
-    assert!((without[0].1 - with[0].1 - 0.5).abs() < 1e-3);
 }
 
 #[test]

@@ -348,35 +348,3 @@ fn damage_is_told_and_the_other_one_is_used() {
         assert!(!younger_unusable(&memory));
     }
 }
-
-#[test]
-fn what_a_calibration_is_tied_to_is_kept_with_it_and_its_damage_leaves_the_calibration() {
-    let front_end = |memory: &Memory| {
-        let mut buffer = heapless::Vec::new();
-        let mut slots = block_on(Slots::open(memory.clone(), &mut buffer));
-        block_on(slots.front_end())
-    };
-    let mut memory = Memory::new();
-    assert_eq!(front_end(&memory), None);
-    let (one, other) = (calibration(1, 2), calibration(2, 2));
-    assert!(store(&mut memory, &one, usize::MAX, 0));
-    assert_eq!(front_end(&memory), Some(FRONT_END));
-    for word in 1..=FRONT_END_WORDS {
-        let mut damaged = memory.clone();
-        damaged.cells[word] = Cell::Torn(None);
-        assert_eq!(front_end(&damaged), None);
-        assert_eq!(found(&damaged).0.as_ref(), Some(&one));
-        // Stored again it is whole again.
-        assert!(store(&mut damaged, &one, usize::MAX, 0));
-        assert_eq!(front_end(&damaged), Some(FRONT_END));
-    }
-    // Of the one in use, not of the one before.
-    let mut buffer = heapless::Vec::new();
-    let mut slots = block_on(Slots::open(memory, &mut buffer));
-    let tied = FrontEnd {
-        pins_c: None,
-        ..FRONT_END
-    };
-    assert_eq!(block_on(slots.store(&other, &tied)), Ok(()));
-    assert_eq!(front_end(&slots.flash), Some(tied));
-}

@@ -4,10 +4,10 @@ use std::fs;
 
 use mimu_rig::field::{FieldTruth, MagnetTruth};
 use mimu_rig::located::Source;
-use mimu_rig::plan::{Plan, Samples};
+use mimu_rig::plan::Plan;
 use mimu_rig::record::{Output, Row, samples, write};
 use mimu_rig::rig_file::{RigFile, RigTruth};
-use mimu_rig::rotation::{Rotation, Vector, add, cross, dot, norm, scale};
+use mimu_rig::rotation::{Vector, add, norm, scale};
 use mimu_rig::table::TableTruth;
 
 fn parse(text: &str) -> Result<RigFile, String> {
@@ -74,18 +74,6 @@ fn an_accelerometer_off_the_origin_feels_the_second_derivative_of_its_own_positi
 }
 
 #[test]
-fn a_rotated_and_delayed_gyro_senses_earlier_rates_along_its_own_axes() {
-    let triad = pure("gyro2", "rotation_deg = [0, 0, 90]\ndelay_ms = 30");
-    let (plan, truth) = (hands(100.0, 4), truth(&triad, 5));
-    let rows: Vec<Row> = samples(&plan, &truth, 5).unwrap().collect();
-    for (k, row) in rows.iter().enumerate() {
-        // Three rows of 10 ms. Its x axis is the board's y.
-        let [x, y, z] = rows[k.saturating_sub(3)].instant.motion.rate;
-        assert_near(row.further[0], [y, -x, z], 1e-9);
-    }
-}
-
-#[test]
 fn a_compass_on_a_level_board_reads_the_field_of_the_earth_by_dip_and_heading() {
     let text = "format = \"mimu-plan/1\"\nsample_rate_hz = 100.0\ncarrier = \"table\"\n[[step]]\nup = [0, 0, 1]\ndwell_s = 0.1\n";
     let plan = Plan::parse(Source::new("PLAN.toml", text)).unwrap();
@@ -123,44 +111,6 @@ fn a_dipole_has_twice_the_field_along_its_axis_as_across_and_falls_with_the_cube
     }
 }
 
-/// Two further triads: one that samples in every fourth row, and one that repeats its samples.
-fn slow() -> String {
-    let mag = pure("mag", "every = 4");
-    let gyro = pure("gyro12", "every = 4\nbetween = \"repeat\"");
-    format!("{mag}{gyro}")
-}
-
-#[test]
-fn a_slower_triad_leaves_cells_empty_or_repeats_its_last_sample() {
-    let (plan, truth) = (hands(100.0, 3), truth(&slow(), 2));
-    let rows: Vec<Row> = samples(&plan, &truth, 2).unwrap().collect();
-    for (k, row) in rows.iter().enumerate() {
-        let [mag, gyro] = [row.further[0], row.further[1]];
-        assert!(mag.iter().all(|x| x.is_nan() == (k % 4 > 0)), "{k} {mag:?}");
-        assert_near(gyro, rows[k - k % 4].instant.motion.rate, 1e-12);
-    }
-    let folder = tempfile::tempdir().unwrap();
-    let mut output = Output::new(&folder.path().join("rec"), &plan).unwrap();
-    output.samples = Samples::Csv;
-    write(&plan, &truth, 2, &output).unwrap();
-    let text = fs::read_to_string(folder.path().join("rec/samples.csv")).unwrap();
-    let mut lines = text.lines();
-    let head = lines.next().unwrap();
-    let columns = "accel_z,mag_x,mag_y,mag_z,gyro12_x,gyro12_y,gyro12_z";
-    assert!(head.ends_with(columns), "{head}");
-    for (line, row) in lines.zip(&rows) {
-        let cells: Vec<&str> = line.split(',').collect();
-        assert_eq!(cells.len(), head.split(',').count(), "{line}");
-        let numbers = row.readings.accel.into_iter().chain(row.further.concat());
-        for (cell, number) in cells[cells.len() - 9..].iter().zip(numbers) {
-            match number.is_nan() {
-                true => assert_eq!(*cell, ""),
-                false => assert_eq!(cell.parse::<f64>().unwrap(), number),
-            }
-        }
-    }
-}
-
 #[test]
 fn further_triads_leave_the_first_two_unchanged_bit_by_bit() {
     let plan = hands(100.0, 3);
@@ -173,36 +123,6 @@ fn further_triads_leave_the_first_two_unchanged_bit_by_bit() {
     let drawn =
         "[[triad]]\nname = \"gyro2\"\n[[triad]]\nname = \"accel2\"\n[[triad]]\nname = \"mag\"\n";
     assert!(run(drawn) == run(""));
-}
-
-#[test]
-fn the_relation_of_a_triad_leads_from_its_readings_to_the_input_in_the_first_frame() {
-    // The first accelerometer's own frame is the body's: its model is triangular. The second has a drawn model.
-    let text = "[unit]\naccel = \"MPU6050-accel\"\n\
-                [unit.accel_affine]\nmatrix = [[1600, 0, 0], [30, 1700, 0], [-20, 40, 1650]]\nbias = [5, -9, 60]\n\
-                [unit.accel_axes]\nbandwidth_hz = [inf, inf, inf]\n\
-                [[triad]]\nname = \"accel2\"\nrotation_deg = [100, -60, 90]\nlever_mm = [10, 20, 30]\ndelay_ms = 5\n\
-                [triad.axes]\nbandwidth_hz = [11.3682, 11.3682, 11.3682]\n";
-    for seed in 0..20 {
-        let truth = truth(text, seed);
-        let further = &truth.further[0];
-        let relation = further.relation(&truth.unit).unwrap();
-        let c = relation.inverse.matrix;
-        for above in [c[0][1], c[0][2], c[1][2]] {
-            assert!(above.abs() < 1e-9 * c[0][0], "{c:?}");
-        }
-        assert!(c[0][0] > 0.0 && c[1][1] > 0.0);
-        let (rows, bias) = further.triad.affine();
-        let input = [3.0, -7.0, 5.0];
-        let mounted = further.rotation.inverse().turn(input);
-        let raw: Vector = std::array::from_fn(|i| dot(rows[i], mounted) + bias[i]);
-        let own = std::array::from_fn(|i| dot(c[i], raw) + relation.inverse.offset[i]);
-        let back = Rotation::by(relation.rotation_deg.map(f64::to_radians)).turn(own);
-        assert_near(back, input, 1e-9);
-        assert_near(relation.lever_mm, [10.0, 20.0, 30.0], 1e-9);
-        // The delay, and 14 ms of its low-pass.
-        assert!((relation.delay_ms - 19.0).abs() < 1e-3, "{relation:?}");
-    }
 }
 
 #[test]
@@ -246,23 +166,4 @@ fn mistakes_in_a_body_are_refused_with_their_line_and_a_remedy() {
     for (text, complaint) in cases {
         assert_eq!(parse(text).unwrap_err(), format!("RIG.toml:{complaint}"));
     }
-}
-
-#[test]
-fn the_position_of_a_board_on_a_table_turns_with_its_offset() {
-    let text = "format = \"mimu-plan/1\"\nsample_rate_hz = 100.0\ncarrier = \"table\"\n[[step]]\nup = [0, 0, 1]\nrate_dps = 90\ndwell_s = 2\n";
-    let plan = Plan::parse(Source::new("PLAN.toml", text)).unwrap();
-    let mut file = parse("").unwrap();
-    file.table = TableTruth {
-        offset_mm: [100.0, 0.0, 0.0],
-        ..TableTruth::ideal()
-    };
-    let truth = RigTruth::resolve(&file, 1).unwrap();
-    let rows: Vec<Row> = samples(&plan, &truth, 1).unwrap().collect();
-    let moved = |k: usize| rows[k].instant.motion.position;
-    let middle = rows.len() - 50;
-    let velocity = scale(50.0, add(moved(middle + 1), scale(-1.0, moved(middle - 1))));
-    let rate = 90_f64.to_radians();
-    assert_near(velocity, cross([0.0, 0.0, rate], moved(middle)), 1e-4);
-    assert!((norm(moved(middle)) - 0.1).abs() < 1e-9);
 }

@@ -1,12 +1,7 @@
 //! The sensors over temperature, against curves and branches written out here.
 
-use std::fs;
-use std::path::{Path, PathBuf};
-
 use mimu_rig::located::Source;
 use mimu_rig::motion::Motion;
-use mimu_rig::plan::Plan;
-use mimu_rig::record;
 use mimu_rig::rig_file::{RigFile, RigTruth};
 use mimu_rig::rotation::Rotation;
 use mimu_rig::unit::Unit;
@@ -128,16 +123,6 @@ misalignment_ppm = [[0, 0, 0, 0], [50, 0, 0, 0], [0, 0, 0, 0], [0, 0, 0, 0], [0,
 }
 
 #[test]
-fn curves_count_from_25_c_when_nothing_else_is_given() {
-    let mut unit =
-        unit("[curves.gyro]\nbias_deg_per_h = [[0, 1, 0, 0], [0, 0, 0, 0], [0, 0, 0, 0]]");
-    let rest = motion([0.0; 3], [0.0; 3]);
-    near(at(&mut unit, &rest, 25.0).0[0], 0.0, 1e-15);
-    // Two lags of nearly equal length lose a few nanokelvin to rounding.
-    near(at(&mut unit, &rest, 26.0).0[0], DEG_PER_H, 1e-7 * DEG_PER_H);
-}
-
-#[test]
 fn hysteresis_goes_by_the_path_of_the_temperature_and_not_by_its_rate() {
     let curves = "[curves.gyro]\nhysteresis_deg_per_h = [30, -60, 0]\nhysteresis_width_c = 8";
     let rest = motion([0.0; 3], [0.0; 3]);
@@ -163,150 +148,6 @@ fn hysteresis_goes_by_the_path_of_the_temperature_and_not_by_its_rate() {
 }
 
 #[test]
-fn a_bias_scatters_from_power_on_to_power_on_by_its_standard_deviation() {
-    let curves = "[curves.gyro]\npower_on_sigma_deg_per_h = [10, 0, 40]\n[curves.accel]\npower_on_sigma_mg = [1, 2, 3]";
-    let n = 2000;
-    let mut squares = [0.0; 4];
-    for seed in 0..n {
-        let unit = truth(curves, seed).unit.curves;
-        let (g, a) = (unit.gyro.power_on, unit.accel.power_on);
-        assert_eq!(g[1], 0.0);
-        let relative = [
-            g[0] / (10.0 * DEG_PER_H),
-            g[2] / (40.0 * DEG_PER_H),
-            a[0] / MG,
-            a[2] / (3.0 * MG),
-        ];
-        for (s, r) in squares.iter_mut().zip(relative) {
-            *s += r * r;
-        }
-    }
-    // Chi-square with 2000 degrees of freedom: the sigma of the variance is 3.2 %.
-    for s in squares {
-        near(s / n as f64, 1.0, 4.0 * 0.032);
-    }
-    // The truth of one power-on reproduces it. Without the given biases, another seed is another power-on.
-    let first = truth(curves, 5);
-    let again = RigFile::parse(&Source::new("truth.toml", first.file.to_toml())).unwrap();
-    assert_eq!(RigTruth::resolve(&again, 6).unwrap(), first);
-    let mut anew = again;
-    anew.curves.gyro.power_on_deg_per_h = None;
-    let anew = RigTruth::resolve(&anew, 6).unwrap().unit;
-    assert_ne!(anew.curves.gyro.power_on, first.unit.curves.gyro.power_on);
-    assert_eq!(anew.curves.accel, first.unit.curves.accel);
-}
-
-#[test]
-fn the_noise_of_a_reading_follows_the_temperature_of_the_die() {
-    let mut unit = unit(
-        "[curves.gyro]\nnoise_at_c_raw = [[0, 0.1, 0, 1], [10, 0.3, 0, 1], [20, 0.3, 0, 2]]\n\
-         [curves.accel]\nnoise_at_c_raw = [[0, 1, 1, 1]]",
-    );
-    let rest = motion([0.0; 3], [0.0; 3]);
-    let n = 4000;
-    for (chamber_c, expected) in [
-        (-20.0, [0.1, 0.0, 1.0]),
-        (5.0, [0.2, 0.0, 1.0]),
-        (15.0, [0.3, 0.0, 1.5]),
-        (60.0, [0.3, 0.0, 2.0]),
-    ] {
-        at(&mut unit, &rest, chamber_c);
-        let (mut gyro, mut accel) = ([0.0; 3], 0.0);
-        for _ in 0..n {
-            let pins = unit.step(&rest, chamber_c);
-            for (s, x) in gyro.iter_mut().zip(pins.gyro_v) {
-                *s += x * x / f64::from(n);
-            }
-            accel += pins.accel_v[1].powi(2) / f64::from(n);
-        }
-        // For 4000 readings, the sigma of a standard deviation is 1.1 %.
-        for i in 0..3 {
-            near(gyro[i].sqrt(), expected[i], 4.0 * 0.0112 * expected[i]);
-        }
-        near(accel.sqrt(), 1.0, 4.0 * 0.0112);
-    }
-}
-
-/// Lag of the reported temperature, and of the bias of the x gyro (1 deg/h/K from 25 °C), on a ramp of 2 K/min; and the lags according to the truth.
-fn late_on_a_ramp(thermal: &str) -> (f64, f64, [f64; 4]) {
-    let curves = "[curves.gyro]\nbias_deg_per_h = [[0, 1, 0, 0], [0, 0, 0, 0], [0, 0, 0, 0]]";
-    let text = format!(
-        "{}\n{curves}\n",
-        PLAIN
-            .replace(
-                "board_lag_s = 0.01\ndie_lag_s = [0.01, 0.01, 0.01, 0.01]\n",
-                ""
-            )
-            .replace("[unit]\n", &format!("{thermal}\n[unit]\n"))
-            .replace("format = \"mimu-rig/1\"\n", "")
-    );
-    let (keys, rest) = text.split_once("[unit]\n").unwrap();
-    let [unit_keys, thermal_keys] = keys.split_once('|').map(|(a, b)| [a, b]).unwrap();
-    let rest = rest.replace("[thermal]\n", &format!("[thermal]\n{thermal_keys}\n"));
-    let text = format!("format = \"mimu-rig/1\"\n[unit]\n{unit_keys}\n{rest}");
-    let file = RigFile::parse(&Source::new("RIG.toml", text)).unwrap();
-    let truth = RigTruth::resolve(&file, 1).unwrap();
-    let mut unit = Unit::new(&truth.unit, 1, 1.0);
-    let still = motion([0.0; 3], [0.0; 3]);
-    let mut last = (0.0, 0.0);
-    for s in 0..20_000 {
-        let pins = unit.step(&still, f64::from(s) / 30.0);
-        last = (pins.temp_c, pins.gyro_v[0] / DEG_PER_H);
-    }
-    (last.0, last.1, truth.unit.die_lag_behind_reported_s())
-}
-
-#[test]
-fn a_die_may_be_behind_the_thermometer_or_ahead_of_it_by_a_lag_that_the_truth_gives() {
-    #[rustfmt::skip]
-    let cases = [
-        // A thermometer on the board: the die lags it by its own lag.
-        ("temperature = \"board\" | board_lag_s = 300\ndie_lag_s = [150, 5, 5, 5]", 150.0),
-        // A thermometer with its own package on the same board: the die leads.
-        ("temperature = \"board\"\ntemperature_lag_s = 200 | board_lag_s = 300\ndie_lag_s = [20, 5, 5, 5]", -180.0),
-        ("temperature = \"gyro_x\" | board_lag_s = 300\ndie_lag_s = [150, 5, 5, 5]", 0.0),
-        ("temperature = \"gyro_y\" | board_lag_s = 300\ndie_lag_s = [150, 40, 5, 5]", 110.0),
-        ("temperature = \"gyro_z\" | board_lag_s = 300\ndie_lag_s = [10, 5, 70, 5]", -60.0),
-        ("temperature = \"accel\" | board_lag_s = 300\ndie_lag_s = [10, 5, 5, 30]", -20.0),
-        ("temperature = \"dies\" | board_lag_s = 300\ndie_lag_s = [90, 30, 60, 30]", 30.0),
-    ];
-    for (thermal, lag_s) in cases {
-        let (temp_c, bias, given) = late_on_a_ramp(thermal);
-        near(given[0], lag_s, 1e-9);
-        // The bias shows the temperature of the die.
-        near(temp_c - (25.0 + bias), lag_s / 30.0, 1e-5);
-    }
-}
-
-#[test]
-fn a_thermometer_that_sticks_or_jumps_leaves_everything_else_as_it_was() {
-    let plan = "format = \"mimu-plan/1\"\nsample_rate_hz = 10\ncarrier = \"table\"\nchamber_c = [[0, 0], [100, 50]]\n\
-                [[step]]\nup = [0, 0, 1]\ndwell_s = 100\n";
-    let plan = Plan::parse(Source::new("PLAN.toml", plan)).unwrap();
-    let run = |flaws: &str| {
-        let rows = record::samples(&plan, &truth(flaws, 3), 3).unwrap();
-        rows.collect::<Vec<_>>()
-    };
-    let good = run("");
-    let bad = run(
-        "[flaws]\nthermometer_sticks_s = [20, 30]\nthermometer_jumps_s = 60\nthermometer_jump_c = -3",
-    );
-    assert_eq!(good.len(), bad.len());
-    for (good, bad) in good.iter().zip(&bad) {
-        let t = good.stamp_s;
-        // The chamber rises by half a kelvin a second, and the plain unit follows within hundredths.
-        let expected = match t {
-            t if (20.0..30.0).contains(&t) => 0.5 * 20.0,
-            t if t >= 60.0 => 0.5 * t - 3.0,
-            t => 0.5 * t,
-        };
-        near(bad.readings.temp_c, expected, 0.02);
-        assert_eq!(bad.readings.gyro, good.readings.gyro);
-        assert_eq!(bad.readings.accel, good.readings.accel);
-    }
-}
-
-#[test]
 fn what_is_wrong_with_curves_and_thermometer_is_named_with_its_line() {
     #[rustfmt::skip]
     let cases = [
@@ -324,44 +165,5 @@ fn what_is_wrong_with_curves_and_thermometer_is_named_with_its_line() {
         let source = Source::new("RIG.toml", format!("format = \"mimu-rig/1\"\n{text}"));
         let found = RigFile::parse(&source).unwrap_err();
         assert!(found.contains(complaint), "{found}");
-    }
-}
-
-fn example(folder: &str, name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join(folder)
-        .join(name)
-}
-
-#[test]
-fn the_head_of_a_truth_gives_the_lags_of_the_dies() {
-    let folder = tempfile::tempdir().unwrap();
-    let plan = "format = \"mimu-plan/1\"\nsample_rate_hz = 10\ncarrier = \"table\"\n[[step]]\nup = [0, 0, 1]\ndwell_s = 1\n";
-    let plan = Plan::parse(Source::new("PLAN.toml", plan)).unwrap();
-    let rig = RigFile::read(&example("rigs", "niu-mtig.toml")).unwrap();
-    let rig = RigTruth::resolve(&rig, 1).unwrap();
-    let output = record::Output::new(&folder.path().join("rec"), &plan).unwrap();
-    record::write(&plan, &rig, 1, &output).unwrap();
-    let text = fs::read_to_string(&output.truth).unwrap();
-    assert!(text.contains("lag temp_c by 60.000, 60.000, 60.000, 30.000 s."));
-}
-
-#[test]
-fn every_example_plan_over_temperature_is_one_that_its_bench_can_carry_out() {
-    for (plan, rig, dwells) in [
-        ("niu-ramp.toml", "niu-mtig.toml", 83 * 16),
-        ("niu-ramp.toml", "niu-nv.toml", 83 * 16),
-        ("soak.toml", "thermal.toml", 9 * 12),
-        ("fang-soak.toml", "fang-soak.toml", 9 * 12),
-    ] {
-        let plan = Plan::read(&example("plans", plan)).unwrap();
-        let rig = RigFile::read(&example("rigs", rig)).unwrap();
-        let rig = RigTruth::resolve(&rig, 1).unwrap();
-        let run = record::samples(&plan, &rig, 1).unwrap();
-        assert_eq!(plan.dwells(), dwells);
-        // The last breakpoint of the chamber is at the end of the recording, to within a round.
-        let end_s = run.len() as f64 / plan.sample_rate_hz;
-        let last = plan.chamber[plan.chamber.len() - 1][0];
-        assert!((end_s - last).abs() < 152.0, "{end_s} {last}");
     }
 }

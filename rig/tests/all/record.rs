@@ -74,15 +74,6 @@ impl Bench {
     fn read(&self, path: &str) -> String {
         fs::read_to_string(self.path().join(path)).unwrap()
     }
-
-    fn names(&self) -> Vec<String> {
-        let entries = fs::read_dir(self.path()).unwrap();
-        let mut names: Vec<_> = entries
-            .map(|e| e.unwrap().file_name().into_string().unwrap())
-            .collect();
-        names.sort();
-        names
-    }
 }
 
 #[test]
@@ -163,20 +154,6 @@ fn a_recording_of_a_table_has_its_columns_its_steps_and_its_head() {
 }
 
 #[test]
-fn by_hand_only_the_size_of_gravity_is_known() {
-    let bench = Bench::new();
-    bench.record("hands.toml --seed 1 -o rec --format csv");
-    let samples = bench.read("rec/samples.csv");
-    assert!(samples.starts_with("t_s,temp_c,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z\n"));
-    assert!(!samples.contains("NaN"));
-    assert!(
-        bench
-            .read("rec/recording.toml")
-            .contains("reference = \"gravity\"")
-    );
-}
-
-#[test]
 fn csv_parquet_and_memory_hold_the_same_numbers() {
     let bench = Bench::new();
     bench.record("table.toml --seed 5 -o a --format csv");
@@ -213,26 +190,6 @@ fn csv_parquet_and_memory_hold_the_same_numbers() {
         count += 1;
     }
     assert!(count > 1250);
-}
-
-#[test]
-fn where_the_earth_does_not_turn_the_recording_says_no_latitude() {
-    let bench = Bench::new();
-    fs::write(
-        bench.path().join("still.toml"),
-        "format = \"mimu-rig/1\"\nearth_rate = false\n",
-    )
-    .unwrap();
-    bench.record("table.toml --rig still.toml --seed 1 -o rec");
-    assert!(!bench.read("rec/recording.toml").contains("latitude"));
-    let plan = Plan::parse(Source::new("table.toml", TABLE)).unwrap();
-    let file = RigFile {
-        earth_rate: Some(false),
-        ..RigFile::default()
-    };
-    let truth = RigTruth::resolve(&file, 1).unwrap();
-    let first = record::samples(&plan, &truth, 1).unwrap().next().unwrap();
-    assert_eq!(first.instant.motion.rate, [0.0; 3]);
 }
 
 #[test]
@@ -284,59 +241,4 @@ fn nothing_is_overwritten_unasked_and_nothing_but_a_recording_ever() {
         "{complaint}"
     );
     assert_eq!(bench.read("rig.toml"), RIG);
-}
-
-#[test]
-fn a_name_with_a_slash_or_a_dot_behind_it_is_the_same_name() {
-    let bench = Bench::new();
-    for (output, name) in [("a/", "a"), ("./b/.", "b")] {
-        bench.record(&format!("table.toml --seed 1 -o {output}"));
-        assert!(bench.names().contains(&name.to_owned()));
-        assert!(bench.names().contains(&format!("{name}.truth.toml")));
-    }
-}
-
-#[test]
-fn a_run_that_fails_leaves_nothing_behind() {
-    let bench = Bench::new();
-    let impossible = TABLE.replace("rate_dps = 100.0", "rate_dps = 1000.0");
-    fs::write(bench.path().join("impossible.toml"), impossible).unwrap();
-    let there = bench.names();
-    let complaint = bench.refused("impossible.toml --seed 1 -o rec");
-    assert!(
-        complaint.contains("impossible.toml:14: `rate_dps`: 1000 is more than the table's 400"),
-        "{complaint}"
-    );
-    assert!(
-        bench
-            .refused("table.toml --seed 1 -o no/such/rec")
-            .contains("make that folder first")
-    );
-    assert!(
-        bench
-            .refused("table.toml --seed 1 -o rec --truth rec/truth.toml")
-            .contains("does not exist")
-    );
-    assert!(
-        bench
-            .refused("table.toml --rig hands.toml --seed 1 -o rec")
-            .contains("hands.toml:")
-    );
-    assert!(
-        bench
-            .refused("table.toml --seed 1 -o ..")
-            .contains("has no name")
-    );
-    assert_eq!(bench.names(), there);
-    assert_eq!(bench.run("table.toml -o rec").status.code(), Some(2));
-    bench.record("table.toml --seed 1 -o rec");
-    for truth in ["rec/truth.toml", "./rec/truth.toml", "rec", "./rec"] {
-        let complaint = bench.refused(&format!(
-            "table.toml --seed 1 -o rec --truth {truth} --replace"
-        ));
-        assert!(
-            complaint.contains("would be inside the recording"),
-            "{complaint}"
-        );
-    }
 }

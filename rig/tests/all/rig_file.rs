@@ -1,15 +1,9 @@
 //! Rig files: drawn values, written values, refusals.
 
 use mimu_rig::catalog::sensors;
-use mimu_rig::converter::Converter;
 use mimu_rig::effects::specs;
-use mimu_rig::ideal::{Angles, Fang, Ideal, XU_TABLE_1, XU_TABLE_2};
 use mimu_rig::located::Source;
-use mimu_rig::motion::Motion;
 use mimu_rig::rig_file::{RigFile, RigTruth};
-use mimu_rig::rotation::{Rotation, Vector};
-use mimu_rig::sensor::TriadTruth;
-use mimu_rig::unit::Unit;
 
 fn parse(text: &str) -> Result<RigFile, String> {
     RigFile::parse(&Source::new(
@@ -21,16 +15,6 @@ fn parse(text: &str) -> Result<RigFile, String> {
 fn truth(text: &str, seed: u64) -> RigTruth {
     RigTruth::resolve(&parse(text).unwrap(), seed).unwrap()
 }
-
-/// Rotating slowly, 1 g up.
-const MOTION: Motion = Motion {
-    t_s: 0.0,
-    attitude: Rotation::NONE,
-    position: [0.0; 3],
-    rate: [0.1; 3],
-    angular_acceleration: [0.0; 3],
-    force: [0.0, 0.0, 9.8],
-};
 
 #[test]
 fn the_truth_is_a_rig_file_in_which_nothing_is_left_to_draw() {
@@ -52,95 +36,6 @@ fn the_truth_is_a_rig_file_in_which_nothing_is_left_to_draw() {
         let again = RigFile::parse(&Source::new("truth.toml", written.clone())).unwrap();
         assert_eq!(RigTruth::resolve(&again, 12).unwrap(), first, "{written}");
     }
-}
-
-#[test]
-fn the_example_rigs_are_what_their_heads_say() {
-    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("rigs");
-    let resolve =
-        |name: &str| RigTruth::resolve(&RigFile::read(&folder.join(name)).unwrap(), 1).unwrap();
-    let same = |name: &str, triad: &TriadTruth, model: Ideal, unit: Vector| {
-        let (matrix, bias) = triad.affine();
-        for i in 0..3 {
-            assert!(
-                (bias[i] - unit[i] * model.bias[i]).abs() < 1e-6,
-                "{name}: {bias:?}"
-            );
-            for j in 0..3 {
-                let expected = unit[i] * model.matrix[i][j];
-                assert!((matrix[i][j] - expected).abs() < 1e-6, "{name}: {matrix:?}");
-            }
-        }
-    };
-    let fang = resolve("fang.toml").unit;
-    let degrees = |v: Vector| v.map(f64::to_radians);
-    let gyro = Fang {
-        scale: [5.07e-3, 5.09e-3, 5.17e-3].map(f64::to_degrees),
-        bias: [2.51, 2.52, 2.48],
-        theta: degrees([-0.18, 0.05, 0.15]),
-        beta: degrees([1.32, 1.05, 1.15]),
-    };
-    let accel = Fang {
-        scale: [80.80e-3, 80.14e-3, 80.84e-3],
-        bias: [1.79, 1.66, 1.74],
-        theta: degrees([0.06, 0.20, 0.19]),
-        beta: degrees([0.01, -0.02, -0.01]),
-    };
-    same(
-        "fang",
-        &fang.gyro,
-        gyro.forward(Angles::Linear, [0.0; 3]),
-        [1.0; 3],
-    );
-    same(
-        "fang",
-        &fang.accel,
-        accel.forward(Angles::Linear, [0.0; 3]),
-        [1.0; 3],
-    );
-    let xu = resolve("xu.toml").unit;
-    let counts = [80.0, 80.0, 8.0].map(f64::to_degrees);
-    same(
-        "xu",
-        &xu.gyro,
-        XU_TABLE_1.forward([0.0; 3]).unwrap(),
-        counts,
-    );
-    same(
-        "xu",
-        &xu.accel,
-        XU_TABLE_2.forward([0.0; 3]).unwrap(),
-        [500.0 / 9.80665; 3],
-    );
-    assert_eq!(resolve("clean.toml").unit.effects, []);
-    assert_eq!(resolve("thermal.toml").unit.effects.len(), 5);
-    assert_eq!(resolve("flawed.toml").unit.effects.len(), 5);
-}
-
-#[test]
-fn one_seed_gives_the_same_bits_and_another_gives_others() {
-    let file = parse("draw_effects = 4").unwrap();
-    let run = |seed: u64| {
-        let truth = RigTruth::resolve(&file, seed).unwrap();
-        let mut unit = Unit::new(&truth.unit, seed, 1e-3);
-        let mut converter = Converter::new(&truth.converter, &truth.unit, seed);
-        (0..100)
-            .map(|_| converter.read(&unit.step(&MOTION, 25.0)))
-            .collect::<Vec<_>>()
-    };
-    assert_eq!(run(1), run(1));
-    assert_ne!(run(1), run(2));
-}
-
-#[test]
-fn stating_one_quantity_leaves_the_others_as_drawn() {
-    let drawn = truth("", 21);
-    let stated = truth("[unit.gyro_axes]\nnull_raw = [2.4, 2.5, 2.6]\n", 21);
-    let mut expected = drawn.unit.clone();
-    for (axis, null) in expected.gyro.axes.iter_mut().zip([2.4, 2.5, 2.6]) {
-        axis.null = null;
-    }
-    assert_eq!(stated.unit, expected);
 }
 
 #[test]

@@ -1,7 +1,5 @@
 //! Heat, sensors and converter against closed forms.
 
-use std::f64::consts::TAU;
-
 use mimu_rig::converter::Converter;
 use mimu_rig::filter::LowPass;
 use mimu_rig::located::Source;
@@ -105,26 +103,6 @@ fn the_dies_warm_up_with_two_time_constants() {
     }
 }
 
-#[test]
-fn on_a_ramp_the_dies_lag_by_the_sum_of_the_lags() {
-    let (truth, dt, ramp) = (heat(f64::INFINITY), 0.5, 0.02);
-    let mut thermal = Thermal::new(&truth, dt);
-    let mut last = None;
-    for n in 0..20_000 {
-        last = Some((
-            dt * f64::from(n),
-            thermal.step(10.0 + ramp * dt * f64::from(n)),
-        ));
-    }
-    let (t, at) = last.unwrap();
-    let air = 10.0 + ramp * t;
-    assert!((at.board - (air + 5.0 - ramp * 300.0)).abs() < 1e-6);
-    for i in 0..4 {
-        let expected = air + 5.0 + truth.die_heating_c[i] - ramp * (300.0 + truth.die_lag_s[i]);
-        assert!((at.die[i] - expected).abs() < 1e-5);
-    }
-}
-
 /// Computed by hand: 16 bits, 3.3 V, divider 0.65 for the gyros.
 #[test]
 fn codes_are_rounded_and_end_at_the_range() {
@@ -158,31 +136,6 @@ fn codes_are_rounded_and_end_at_the_range() {
         ..pins(2.5, 1.65)
     };
     assert_eq!(converter.read(&high).accel, [32444.0; 3]);
-}
-
-#[test]
-fn taking_out_the_reference_removes_its_drift() {
-    for (take_out, expected) in [(false, 0.01), (true, 0.0)] {
-        let text = format!(
-            "{QUIET}\n[converter]\nbits = 24\nnoise_codes = 0\nreference_ppm_per_c = 1000\ntake_out_reference = {take_out}\n\
-             [thermal]\non_before_s = inf\n"
-        );
-        let truth = truth(&text, 1);
-        let mut converter = Converter::new(&truth.converter, &truth.unit, 1);
-        let mut at = |chamber_c: f64| {
-            let mut unit = Unit::new(&truth.unit, 1, 1e-3);
-            converter.read(&unit.step(&still([0.5; 3], [9.8, 0.0, 0.0]), chamber_c))
-        };
-        let (cold, warm) = (at(20.0), at(30.0));
-        // 1e-3/K over 10 K raises the true reference and lowers the reading by this share.
-        for (c, w) in [(cold.gyro[1], warm.gyro[1]), (cold.accel[0], warm.accel[0])] {
-            let change = c / w - 1.0;
-            assert!(
-                (change - expected).abs() < 1e-4 * (1.0 + 3.0 * expected),
-                "{take_out}: {change}"
-            );
-        }
-    }
 }
 
 #[test]
@@ -226,60 +179,4 @@ fn outputs_stop_at_the_rails() {
     let supply = pins.supply_v / 3.3;
     assert_eq!(pins.gyro_v[..2], [4.75, 0.25]);
     assert_eq!(pins.accel_v[..2], [supply * 3.05, supply * 0.25]);
-}
-
-#[test]
-fn a_stated_forward_model_is_exactly_what_the_unit_reads() {
-    let text = format!(
-        "{QUIET}white_per_sample = [0.001, 0.001, 0.001]\nlow_raw = -10\nhigh_raw = 10\n\
-         [unit.accel_affine]\nmatrix = [[0.01, -0.001, 0.0005], [0.03, 0.0475, 0.00075], [-0.0423, 0.0774, 0.08703]]\n\
-         bias = [2.0, 2.5, 2.9]\n"
-    );
-    let mut file = parse(&text).unwrap();
-    file.unit.supply_error_ppm = Some(0.0);
-    let truth = RigTruth::resolve(&file, 4).unwrap();
-    let mut unit = Unit::new(&truth.unit, 4, 1e-3);
-    let (mut mean, mut square) = ([0.0; 3], 0.0);
-    let count = 40_000;
-    for _ in 0..count {
-        let v = unit.step(&still([0.0; 3], [9.8, -9.8, 4.9]), 25.0).accel_v;
-        for i in 0..3 {
-            mean[i] += v[i] / f64::from(count);
-        }
-        square += (v[0] - 2.11025).powi(2);
-    }
-    // By hand: 0.098 + 0.0098 + 0.00245 and so on.
-    for (m, expected) in mean.iter().zip([2.11025, 2.332175, 2.153387]) {
-        assert!(
-            (m - expected).abs() < 5.0 * 0.001 / f64::from(count).sqrt(),
-            "{m}"
-        );
-    }
-    let variance = square / f64::from(count) / 1e-6;
-    assert!(
-        (variance - 1.0).abs() < 4.0 * (2.0 / f64::from(count)).sqrt(),
-        "{variance}"
-    );
-}
-
-#[test]
-fn a_rate_step_passes_the_gyro_with_the_lag_of_40_hertz() {
-    let quiet = QUIET.replacen(
-        "bandwidth_hz = [inf, inf, inf]",
-        "bandwidth_hz = [40, 40, 40]",
-        1,
-    );
-    let truth = truth(&quiet, 1);
-    let dt = 1e-3;
-    let mut unit = Unit::new(&truth.unit, 1, dt);
-    let axis = &truth.unit.gyro.axes[2];
-    let felt = |pins: Pins| (pins.gyro_v[2] - axis.null) / (axis.sensitivity * axis.direction[2]);
-    assert!(felt(unit.step(&still([0.0; 3], [0.0; 3]), 25.0)).abs() < 1e-12);
-    let tau = 1.0 / (TAU * 40.0);
-    let first = 1.0 - tau / dt * (1.0 - (-dt / tau).exp());
-    for n in 0..40 {
-        let now = felt(unit.step(&still([0.0, 0.0, 1.0], [0.0; 3]), 25.0));
-        let expected = 1.0 - (1.0 - first) * (-dt * f64::from(n) / tau).exp();
-        assert!((now - expected).abs() < 1e-9, "{now} {expected}");
-    }
 }

@@ -5,7 +5,7 @@ use mimu::judgement::{Judgement, JudgementKind};
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
 use mimu::signal::dwell::Keep;
-use mimu::signal::stillness::{DwellSearch, STILL_FACTOR, Steps};
+use mimu::signal::stillness::STILL_FACTOR;
 use mimu::unseen::{BEYOND_NOISE, FALSE_ALARM, Test, Unseen};
 use mimu::warning::Warning;
 use mimu_recording::error::Error;
@@ -87,24 +87,6 @@ impl Session {
                 *value = (*value + add).round();
             }
         }
-    }
-
-    /// Readings converted to SI with the true scale factors and biases, but without the misalignments.
-    fn in_si(mut self) -> Self {
-        self.manifest.raw_unit = RawUnit::Si;
-        let axes = self
-            .truth
-            .unit
-            .gyro
-            .axes
-            .iter()
-            .chain(&self.truth.unit.accel.axes);
-        for (column, axis) in self.samples.raw.iter_mut().zip(axes) {
-            for value in column {
-                *value = (*value - axis.null) / axis.sensitivity;
-            }
-        }
-        self
     }
 
     /// How many of the accelerometer's scale factors and biases are inside the intervals of `fit`, and their number.
@@ -287,130 +269,6 @@ fn a_scale_factor_that_the_poses_leave_open_is_refused_with_the_pose_that_is_mis
     let refused = session.fit().expect_err("a cap of poses").to_string();
     says(&refused, &["undetermined", "-z"]);
     assert!(!refused.contains("wrong columns"), "{refused}");
-}
-
-#[test]
-fn readings_in_si_are_judged_uncalibrated_beside_every_fit() {
-    let session = Session::of(FIXTURE, QUIET, 1).in_si();
-    let found = session.fit().expect("ten poses");
-    for sensor in &found.sensors {
-        let came = sensor.uncalibrated_rms.expect("in SI");
-        let better = sensor.held_out_rms().unwrap_or(sensor.rms()) < came;
-        let warned = sensor
-            .warnings
-            .iter()
-            .any(|w| w.to_string().contains("does not improve the readings"));
-        assert_eq!(better, !warned, "{}: {came}", sensor.sensor);
-    }
-    // The error of the samples themselves: misalignments do not change the magnitude at a face.
-    let accel = found.sensor(Sensor::Accel).expect("recorded");
-    let dwells = &found.prepared.dwells.list;
-    let squares = accel.residuals.iter().map(|r| {
-        let size = dwells[r.dwell].raw_mean(Sensor::Accel).norm();
-        (size - session.manifest.gravity_mps2).powi(2)
-    });
-    let rms = (squares.sum::<f64>() / accel.residuals.len() as f64).sqrt();
-    assert!((accel.uncalibrated_rms.expect("in SI") / rms - 1.0).abs() < 1e-12);
-}
-
-#[test]
-fn a_channel_whose_step_is_coarser_than_its_noise_is_not_stuck() {
-    let mut session = Session::of(THIRTEEN, QUIET, 4);
-    // Quantisation step of 0.3 deg/s; the noise of a sample is 0.03 deg/s.
-    for value in session.samples.raw[..3].iter_mut().flatten() {
-        *value = (*value / 20.0).round() * 20.0;
-    }
-    let prepared = session.prepared();
-    let faults: Vec<String> = prepared
-        .dwells
-        .list
-        .iter()
-        .filter_map(|d| d.faults.gyro)
-        .map(|f| f.to_string())
-        .collect();
-    assert!(!faults.iter().any(|f| f.contains("stuck")), "{faults:?}");
-    let found = session.fit().expect("thirteen poses");
-    assert!(
-        !found
-            .warnings
-            .iter()
-            .any(|w| w.to_string().contains("stuck")),
-        "{:?}",
-        found.warnings
-    );
-}
-
-/// Faces at rest, and turns through gravity of which only the rate is known.
-fn turning_through_gravity() -> (Manifest, Batch) {
-    let mut plan =
-        String::from("format = \"mimu-plan/1\"\nsample_rate_hz = 100.0\ncarrier = \"table\"\n");
-    let mut step = |up: [i32; 3], spin: f64| {
-        plan += &format!("[[step]]\nup = {up:?}\nspin_dps = {spin:?}\ndwell_s = 4.0\n");
-    };
-    for up in [
-        [1, 0, 0],
-        [-1, 0, 0],
-        [0, 1, 0],
-        [0, -1, 0],
-        [0, 0, 1],
-        [0, 0, -1],
-        [1, 1, 1],
-    ] {
-        step(up, 0.0);
-    }
-    for spin in [-180.0, -60.0, 60.0, 180.0] {
-        step([1, 0, 0], spin);
-    }
-    let plan = Plan::parse(Source::new("plan", &plan)).expect("a plan");
-    let file = RigFile::parse(&Source::new("rig", QUIET)).expect("a rig file");
-    let truth = RigTruth::resolve(&file, 3).expect("a rig");
-    let mut batch = Batch::default();
-    for row in samples(&plan, &truth, 3).expect("a run") {
-        batch.t_s.push(row.stamp_s);
-        let step = row.instant.step.map_or(-1, |s| s as i32);
-        batch.step.push(step);
-        let all = row.readings.gyro.iter().chain(&row.readings.accel);
-        for (column, value) in batch.raw.iter_mut().zip(all) {
-            column.push(*value);
-        }
-        let turns = step >= 7;
-        for k in 0..3 {
-            let [rate, force] = [row.instant.stated_rate, row.instant.stated_force]
-                .map(|known| known.expect("a table knows")[k]);
-            batch.reference[k].push(rate.to_degrees());
-            batch.reference[3 + k].push(if turns { f64::NAN } else { force });
-        }
-    }
-    let gravity = plan.place.gravity;
-    let manifest = Manifest::new("unit", 100.0, gravity, RawUnit::Count, Reference::Table);
-    (manifest, batch)
-}
-
-#[test]
-fn a_dwell_that_turns_through_gravity_without_a_known_force_is_no_noise() {
-    let (manifest, batch) = turning_through_gravity();
-    let search = DwellSearch {
-        still_factor: STILL_FACTOR,
-        steps: Steps::Given,
-    };
-    let prepared = Prepared::of(manifest, &batch, search).expect("readable");
-    let options = Options {
-        only: Some(Sensor::Accel),
-        ..Options::default()
-    };
-    let found = fit(prepared, options).expect("seven poses");
-    let accel = found.sensor(Sensor::Accel).expect("recorded");
-    // 400 µg/√Hz over four seconds are 1 mm/s²; taken for noise, the swing of gravity was 1.5 m/s².
-    assert!(accel.noise_floor() < 5e-3, "{}", accel.noise_floor());
-
-    let (manifest, mut batch) = turning_through_gravity();
-    for (k, step) in batch.step.iter_mut().enumerate() {
-        if batch.reference[3][k].is_finite() && *step >= 0 {
-            *step = -1;
-        }
-    }
-    let turns_only = Prepared::of(manifest, &batch, search).expect("readable");
-    assert!(!turns_only.noise.is_known(Sensor::Accel) && turns_only.noise.is_known(Sensor::Gyro));
 }
 
 #[test]

@@ -1,12 +1,9 @@
 //! Flaws of real recordings, made by the bench: each is detected, and the calibration is as good as without it.
 
 use mimu::fit::{Fit, Options, fit};
-use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
 use mimu::signal::dwell::{Dwell, Fault};
-use mimu::signal::stillness::STILL_FACTOR;
 use mimu::warning::Warning;
-use mimu_recording::{ImportOptions, RawUnit, Recording, Reference, import};
 use mimu_rig::located::Source;
 use mimu_rig::rig_file::RigFile;
 use mimu_tests::bench;
@@ -127,33 +124,5 @@ fn a_real_effect_is_no_outlier() {
         );
         let turning = |d: &Dwell| d.faults.gyro == Some(Fault::Turning);
         assert!(!fit.prepared.dwells.list.iter().any(turning), "{effect}");
-    }
-}
-
-#[test]
-fn jittering_stamps_that_are_imported_lose_no_turn() {
-    for flaw in ["stamp_jitter_s = 0.003", "stamp_burst = 4"] {
-        let file = rig(&format!("[flaws]\n{flaw}\n"));
-        let folder = bench::written(&bench::hand_plan(38), &file, 7);
-        let written = Recording::open(&folder.path().join("recording")).expect("a recording");
-        let options = ImportOptions::new(
-            vec![written.samples],
-            9.80665,
-            RawUnit::Count,
-            Reference::Gravity,
-        );
-        let path = folder.path().join("imported");
-        let summary = import(&options, &path, |_| ()).expect("importable");
-        assert_eq!(summary.time[0].gaps, 0, "{flaw}: {:?}", summary.time);
-        assert!((summary.sample_rate_hz - 100.0).abs() < 0.01, "{flaw}");
-        let recording = Recording::open(&path).expect("a recording");
-        let prepared = Prepared::read(&recording, STILL_FACTOR, |_| ()).expect("readable");
-        let fit = fit(prepared, Options::default()).expect("it can be fitted");
-        assert!(scale_error(&fit) < FINE, "{flaw}: {}", scale_error(&fit));
-        let turns = fit
-            .warnings
-            .iter()
-            .any(|w| w.to_string().contains("the turn from"));
-        assert!(!turns, "{flaw}: {:?}", fit.warnings);
     }
 }

@@ -1,9 +1,11 @@
 //! The prior of a population: six poses with it against twenty without, and units that are none of it.
 
-use std::ffi::OsStr;
+use std::ffi::OsString;
 use std::fs;
+use std::path::Path;
 
 use mimu::{Calibration, Sensor};
+use mimu_tests::bench;
 use mimu_tests::fleet::{Judged, OF_IT, Promise, fitted, prior, study, unit};
 use mimu_tests::says;
 
@@ -37,34 +39,16 @@ fn six_poses_with_the_prior_determine_scale_factors_and_biases() {
 }
 
 #[test]
-fn a_design_beside_the_prior_predicts_the_half_widths_that_fits_state() {
-    let prior = prior(40);
-    // What few poses show depends on how well a person takes them: 3 degrees, and 0.1 on a fixture with six faces.
-    for (poses, aim_deg) in [(6, 3.0), (6, 0.1), (9, 3.0)] {
-        let promise = Promise::of(&prior, poses, aim_deg, 1000..1031);
-        assert!(promise.stated.len() >= 28, "{} without", promise.without);
-        for (k, ratio) in promise.ratios().iter().enumerate() {
-            assert!(
-                (ratio - 1.0).abs() < 0.2,
-                "{poses} poses, {aim_deg} degrees, {k}: {ratio}"
-            );
-        }
-    }
-}
-
-#[test]
 fn few_poses_of_a_stranger_are_not_believed_to_be_of_the_population() {
     let prior = prior(40);
     for of in [[0, 0], [0, 9], [1, 0], [1, 9]] {
-        for poses in [6, 9] {
-            let (_, _, given_up) = study(20_000..20_006, poses, Some(&prior), (of, 8.0));
-            println!("{of:?}, {poses} poses: {given_up} of 6");
-            assert!(given_up >= 5, "{of:?}, {poses} poses: {given_up} of 6");
-        }
+        let (_, _, given_up) = study(20_000..20_006, 6, Some(&prior), (of, 8.0));
+        assert!(given_up >= 5, "{of:?}, six poses: {given_up} of 6");
     }
 }
 
 #[test]
+#[ignore = "nightly: 72 units"]
 fn turns_between_poses_show_angles_that_are_not_of_the_population() {
     let prior = prior(40);
     // Five turns between six poses show such an angle in one of five units: the angles of the gyro explain them as well.
@@ -125,88 +109,47 @@ fn the_commands_write_a_prior_and_fit_with_it() {
         fs::create_dir_all(&path).expect("a folder");
         fs::write(path.join(format!("u{seed:02}.toml")), file.to_toml()).expect("written");
     }
-    let path = |name: &str| folder.path().join(name);
-    let run = |arguments: &[&OsStr]| {
-        let all = std::iter::once(OsStr::new("mimu")).chain(arguments.iter().copied());
-        mimu_cli::run(all.map(OsStr::to_owned))
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let run = |arguments: &str| {
+        let (at, words) = (path(""), format!("mimu {arguments}"));
+        let all = words
+            .split(' ')
+            .map(|word| OsString::from(word.replace("./", &at)));
+        mimu_cli::run(all)
     };
-    let [cals, page, json, prior, cal] =
-        ["cals", "fleet.html", "fleet.json", "kind.toml", "cal.toml"].map(path);
-    let o = |s: &'static str| OsStr::new(s);
-    let fleet = [
-        o("fleet"),
-        cals.as_os_str(),
-        o("-o"),
-        page.as_os_str(),
-        o("--json"),
-        json.as_os_str(),
-        o("--prior"),
-        prior.as_os_str(),
-    ];
-    assert_eq!(run(&fleet), 0);
-    let found: serde_json::Value =
-        serde_json::from_str(&fs::read_to_string(&json).expect("JSON")).expect("JSON");
+    let json = || -> serde_json::Value {
+        serde_json::from_str(&fs::read_to_string(path("fleet.json")).expect("JSON")).expect("JSON")
+    };
+    let fleet = "fleet ./cals --json ./fleet.json";
     assert_eq!(
-        (&found["format"], &found["units"]),
-        (&"mimu-fleet/1".into(), &24.into())
-    );
-    assert_eq!(
-        found["sensors"]["accel"]["parameters"]
-            .as_array()
-            .map(Vec::len),
-        Some(9)
-    );
-    assert!(
-        fs::read_to_string(&page)
-            .expect("a page")
-            .contains("Fleet of 24 units")
-    );
-    let six =
-        mimu_tests::bench::written(&mimu_tests::bench::hand_plan(6), &unit(3000, OF_IT).file, 5);
-    let recording = six.path().join("recording");
-    let with = [
-        o("fit"),
-        recording.as_os_str(),
-        o("--prior"),
-        prior.as_os_str(),
-        o("-o"),
-        cal.as_os_str(),
-    ];
-    assert_eq!(run(&with), 0);
-    let made = Calibration::read(&cal).expect("a calibration");
-    assert!(
-        made.accel
-            .and_then(|a| a.judged)
-            .is_some_and(|j| j.estimator.ends_with("and a prior"))
-    );
-    // It would confirm the population that it came from.
-    fs::copy(&cal, cals.join("with-prior.toml")).expect("copied");
-    assert_eq!(
-        run(&[o("fleet"), cals.as_os_str(), o("--json"), json.as_os_str()]),
+        run(&format!("{fleet} -o ./fleet.html --prior ./kind.toml")),
         0
     );
-    let found: serde_json::Value =
-        serde_json::from_str(&fs::read_to_string(&json).expect("JSON")).expect("JSON");
-    assert_eq!(found["units"], 24);
-    assert!(
-        found["left_out"][0]["reason"]
-            .as_str()
-            .is_some_and(|r| r.contains("with a prior")),
-        "{}",
-        found["left_out"]
-    );
-    // Without the prior six faces give scale factors and biases. A calibration is refused as a prior.
-    assert_eq!(run(&[o("fit"), recording.as_os_str()]), 0);
-    let other = cals.join("batch=0/u02.toml");
     assert_eq!(
-        run(&[
-            o("fit"),
-            recording.as_os_str(),
-            o("--prior"),
-            other.as_os_str()
-        ]),
-        1
+        (&json()["format"], &json()["units"]),
+        (&"mimu-fleet/1".into(), &24.into())
     );
+    let page = fs::read_to_string(path("fleet.html")).expect("a page");
+    assert!(page.contains("Fleet of 24 units"));
+    bench::written_in(
+        Path::new(&path("six")),
+        &bench::hand_plan(6),
+        &unit(3000, OF_IT).file,
+        5,
+    );
+    assert_eq!(run("fit ./six --prior ./kind.toml -o ./cal.toml"), 0);
+    let made = Calibration::read(Path::new(&path("cal.toml"))).expect("a calibration");
+    let estimator = made.accel.and_then(|a| a.judged).expect("judged").estimator;
+    assert!(estimator.ends_with("and a prior"), "{estimator}");
+    // It would confirm the population that it came from.
+    fs::copy(path("cal.toml"), path("cals/with-prior.toml")).expect("copied");
+    assert_eq!(run(fleet), 0);
+    assert_eq!(json()["units"], 24);
+    let reason = json()["left_out"][0]["reason"].to_string();
+    assert!(reason.contains("with a prior"), "{reason}");
+    // Without the prior six faces give scale factors and biases. A calibration is refused as a prior.
+    assert_eq!(run("fit ./six"), 0);
+    assert_eq!(run("fit ./six --prior ./cals/batch=0/u02.toml"), 1);
 }
 
 #[test]

@@ -58,7 +58,7 @@ fn clean_sessions_are_good_or_untested_and_so_is_their_file_on_another_session()
         "by hand, 24 poses, 100 Hz",
         "table, consumer",
     ];
-    let wrong = wrong(&names, 2, objected);
+    let wrong = wrong(&names, 1, objected);
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
@@ -66,7 +66,7 @@ fn clean_sessions_are_good_or_untested_and_so_is_their_file_on_another_session()
 fn an_effect_of_five_times_the_noise_is_never_called_good() {
     let wrong = wrong(
         &["by hand, 24 poses, 100 Hz", "table, consumer"],
-        2,
+        1,
         called_good,
     );
     assert!(wrong.is_empty(), "{wrong:#?}");

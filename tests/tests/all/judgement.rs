@@ -32,25 +32,13 @@ fn kind(prepared: Prepared) -> JudgementKind {
 }
 
 /// What a driver makes of the volts of the bench: readings in rad/s and m/s² by the data sheet's 5 mV per deg/s about 2.5 V and 80 mV per m/s² about
-/// 1.65 V, then changed by `fault`, which is given the share of the recording that has passed and the six readings. Time is multiplied by
-/// `time`.
-fn driven(unit: RawUnit, time: f64, fault: impl Fn(f64, &mut [f64])) -> Prepared {
-    driven_on(SEED, unit, time, fault)
+/// 1.65 V, then changed by `fault`, which is given the share of the recording that has passed and the six readings.
+fn driven(fault: impl Fn(f64, &mut [f64])) -> Prepared {
+    driven_on(SEED, fault)
 }
 
-/// The same on the day `seed`.
-fn driven_on(seed: u64, unit: RawUnit, time: f64, fault: impl Fn(f64, &mut [f64])) -> Prepared {
-    let plan = bench::hand_plan(30).replace("carrier", "samples = \"csv\"\ncarrier");
-    let folder = bench::written(&plan, &self::unit(), seed);
-    let recording = folder.path().join("recording");
-    convert(&recording.join("samples.csv"), time, fault);
-    let mut recording = Recording::open(&recording).expect("a recording");
-    recording.manifest.raw_unit = unit;
-    recording.manifest.sample_rate_hz /= time;
-    Prepared::read(&recording, STILL_FACTOR, |_| ()).expect("readable")
-}
-
-fn convert(path: &Path, time: f64, fault: impl Fn(f64, &mut [f64])) {
+/// Converts the readings of a file to SI by the nulls and sensitivities of the parts, with a fault.
+fn convert(path: &Path, fault: impl Fn(f64, &mut [f64])) {
     let text = fs::read_to_string(path).expect("samples");
     let rows = text.lines().count() as f64;
     let mut lines = text.lines();
@@ -73,43 +61,32 @@ fn convert(path: &Path, time: f64, fault: impl Fn(f64, &mut [f64])) {
         for (cell, value) in cells[first..].iter_mut().zip(six) {
             *cell = format!("{value:.9}");
         }
-        let t_s: f64 = cells[at("t_s")].parse().expect("a time");
-        cells[at("t_s")] = format!("{:.9}", t_s * time);
         out += &(cells.join(",") + "\n");
     }
     fs::write(path, out).expect("written");
+}
+
+/// The same on the day `seed`.
+fn driven_on(seed: u64, fault: impl Fn(f64, &mut [f64])) -> Prepared {
+    let plan = bench::hand_plan(30).replace("carrier", "samples = \"csv\"\ncarrier");
+    let folder = bench::written(&plan, &self::unit(), seed);
+    let recording = folder.path().join("recording");
+    convert(&recording.join("samples.csv"), fault);
+    let mut recording = Recording::open(&recording).expect("a recording");
+    recording.manifest.raw_unit = RawUnit::Si;
+    Prepared::read(&recording, STILL_FACTOR, |_| ()).expect("readable")
 }
 
 #[test]
 fn a_clean_session_of_thirty_poses_is_good() {
     let prepared = bench::recorded(&bench::hand_plan(30), &unit(), SEED);
     assert_eq!(kind(prepared), JudgementKind::Good);
-    assert_eq!(
-        kind(driven(RawUnit::Si, 1.0, |_, _| ())),
-        JudgementKind::Good
-    );
-}
-
-#[test]
-fn a_wrong_unit_rate_or_sign_is_suspect_although_all_data_agree() {
-    let degrees = |_: f64, six: &mut [f64]| six[..3].iter_mut().for_each(|v| *v = v.to_degrees());
-    let suspect = [
-        ("deg/s called SI", driven(RawUnit::Si, 1.0, degrees)),
-        ("200 Hz called 100", driven(RawUnit::Si, 2.0, |_, _| ())),
-        ("SI called counts", driven(RawUnit::Count, 1.0, |_, _| ())),
-        (
-            "a negated axis",
-            driven(RawUnit::Si, 1.0, |_, six| six[0] = -six[0]),
-        ),
-    ];
-    for (fault, prepared) in suspect {
-        assert_eq!(kind(prepared), JudgementKind::Suspect, "{fault}");
-    }
+    assert_eq!(kind(driven(|_, _| ())), JudgementKind::Good);
 }
 
 #[test]
 fn a_range_that_changes_in_the_middle_is_a_misfit_or_refused() {
-    let changed = driven(RawUnit::Si, 1.0, |passed, six| {
+    let changed = driven(|passed, six| {
         if passed > 0.5 {
             six[3..].iter_mut().for_each(|v| *v *= 0.5);
         }
@@ -128,7 +105,7 @@ fn nothing_held_out_is_untested() {
 
 #[test]
 fn an_error_that_the_model_lacks_is_unexplained_and_a_file_contains_it() {
-    let fit = fitted(driven(RawUnit::Si, 1.0, bent));
+    let fit = fitted(driven(bent));
     let judgement = Judgement::of_fit(&fit);
     assert_eq!(judgement.kind, JudgementKind::Unexplained);
     let file = Calibration::of(&fit, &[], "").expect("a file").to_toml();
@@ -144,11 +121,11 @@ fn bent(_: f64, six: &mut [f64]) {
 /// The misfit widens the intervals of the file, and is as large on the next day.
 #[test]
 fn a_file_whose_own_fit_errs_is_good_on_no_other_day() {
-    let first = fitted(driven(RawUnit::Si, 1.0, bent));
+    let first = fitted(driven(bent));
     let file = Calibration::of(&first, &[], "").expect("a file");
     let own = file.judgement.clone().expect("a judgement");
     for seed in [5, 6] {
-        let later = driven_on(seed, RawUnit::Si, 1.0, bent);
+        let later = driven_on(seed, bent);
         let found = verify(&later, &file).expect("verified");
         assert!(found.judgement.kind >= own.kind, "{}", found.judgement);
         // Also without the word of the file.

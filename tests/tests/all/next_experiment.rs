@@ -92,24 +92,6 @@ fn a_cubic_that_low_rates_cannot_show_is_found_by_the_next_experiment() {
 }
 
 #[test]
-fn an_accelerometer_s_cubic_that_six_faces_cannot_show_is_found_by_the_next_experiment() {
-    // Data-sheet size. A diagnosis divides by the scale factor that it found without the effect, so a cubic of 15 mg/g³ comes out 1.5 % too small.
-    let sizes = [5.0, -4.0, 6.0];
-    let unit = unit("accel_scale_cubic", "mg_per_g3", sizes);
-    let truth = sizes.map(|s| s * 9.80665e-3 / 9.80665f64.powi(3));
-    shown_by_the_next("accel_scale_cubic", &unit, &[100.0], 21, truth);
-}
-
-#[test]
-fn a_scale_factor_by_temperature_that_a_room_cannot_show_is_found_by_the_next_experiment() {
-    // Not a bias: five minutes of the unit's own warm-up already show that.
-    let sizes = [350.0, -300.0, 400.0];
-    let unit = unit("gyro_thermal_scale", "ppm_per_c", sizes);
-    let truth = sizes.map(|s: f64| 1e-6 * s);
-    shown_by_the_next("gyro_thermal_scale", &unit, &[100.0], 31, truth);
-}
-
-#[test]
 fn two_effects_that_one_rate_confuses_are_told_apart_by_the_next_experiment() {
     // At ±150 deg/s and rest, a square and an asymmetry are the same.
     for (id, seed) in [("gyro_scale_quadratic", 3), ("gyro_scale_asymmetry", 4)] {

@@ -73,20 +73,3 @@ fn every_file_test_and_block_in_the_coverage_of_the_papers_exists() {
         "{files} {tests} {blocks}"
     );
 }
-
-#[test]
-fn the_coverage_of_the_papers_counts_its_own_items() {
-    let (_, text) = coverage();
-    let count = |state: &str| {
-        let heading = format!("\n\n{state}:\n\n");
-        text.split(&heading)
-            .skip(1)
-            .map(|l| l.lines().take_while(|l| l.starts_with("- ")).count())
-            .sum::<usize>()
-    };
-    let [whole, part, none] = ["Whole", "In part", "Not"].map(count);
-    let all = text.lines().filter(|l| l.starts_with("- ")).count();
-    assert_eq!(whole + part + none, all, "items outside the three lists");
-    let said = format!("{all} items: {whole} whole, {part} in part, {none} not");
-    assert!(text.contains(&said), "{said}");
-}

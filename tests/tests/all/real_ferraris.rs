@@ -10,8 +10,7 @@ use mimu::quantity::Sensor;
 use mimu::triad::invert;
 use mimu_core::compensation::Affine;
 use mimu_recording::RawUnit;
-use mimu_tests::recordings::{Foreign, Samples, data_set, numbers, rms};
-use mimu_tests::says;
+use mimu_tests::recordings::{Foreign, Samples, data_set, numbers};
 use nalgebra::{Matrix3, Vector3};
 use tempfile::TempDir;
 
@@ -352,99 +351,4 @@ fn turns_give_imucals_gyro_once_its_term_in_specific_force_is_added_back() {
         // to 1.5 degrees off.
         assert!(share.to_degrees() < 0.05, "{term}");
     });
-}
-
-#[test]
-fn moves_between_faces_that_no_fit_has_seen_are_predicted_as_well_as_by_imucal() {
-    let Some((session, samples)) = uninterrupted() else {
-        return;
-    };
-    let fit = session.fit(true);
-    let data = data_set("imucal_ferraris").expect("it was there");
-    let faces = session_parts(&data).into_iter();
-    let faces = faces.filter(|(name, _)| !name.ends_with("rot"));
-    let rows: Vec<_> = faces.map(|(_, rows)| rows).collect();
-    let published = &session.published;
-    let per_radian = |m: &Affine<f64>| Affine {
-        matrix: m.matrix * 1f64.to_degrees(),
-        offset: m.offset,
-    };
-    let inverse = |m: &Affine<f64>| invert(m).expect("regular");
-    let ours = [Sensor::Accel, Sensor::Gyro].map(|s| inverse(&forward(&fit, s)));
-    let theirs = [
-        inverse(&published.accel),
-        inverse(&per_radian(&published.gyro)),
-    ];
-    // imucal's whole model: the reading without K_ga f, sample by sample.
-    let corrected = Samples {
-        gyro: samples
-            .gyro
-            .iter()
-            .zip(&samples.accel)
-            .map(|(u, a)| u - published.k_ga * theirs[0].apply(a))
-            .collect(),
-        ..samples.clone()
-    };
-    let all = [
-        samples.direction_errors(&rows, &ours[0], &ours[1]),
-        corrected.direction_errors(&rows, &theirs[0], &theirs[1]),
-    ];
-    let all = all.map(|errors| rms(errors).to_degrees());
-    // 0.729 is the result of imucal's own program, with its own integration of the same rows.
-    assert!((all[1] - 0.729).abs() < 0.002, "{} deg", all[1]);
-    // The two calibrations differ by an accelerometer bias of 3 counts, 0.08 degrees of direction, so differences of that size are chance. The degree
-    // between x_p and x_a comes from the sensors or the hand.
-    assert!(all[0] < all[1] + 0.08, "{} deg", all[0]);
-}
-
-/// The session of six faces and three turns as a recording by hand, with these columns.
-fn by_hand(columns: &'static str) -> Option<mimu_recording::error::Result<Fit>> {
-    let data = data_set("imucal_ferraris")?;
-    let foreign = Foreign {
-        files: vec![(data.join("example_ferraris_session.csv"), columns)],
-        rate_hz: Some(SESSION_RATE_HZ),
-        gravity_mps2: GRAVITY,
-        raw_unit: RawUnit::Si,
-        scales: &["gyro=0.017453292519943295"],
-        inputs: None,
-    };
-    Some(foreign.fit())
-}
-
-#[test]
-fn six_faces_taken_for_poses_by_hand_are_refused_with_what_they_lack_where_no_gyro_measures_the_turns()
- {
-    let Some(fit) = by_hand("sample,-,-,-,accel_x,accel_y,accel_z") else {
-        return;
-    };
-    // Six faces, accurate to a degree or two, determine six numbers: scale factors and biases. The three non-orthogonalities depend on these small
-    // deviations, and repeated faces add nothing.
-    let error = fit.expect_err("it lacks slanted poses");
-    says(
-        &error.to_string(),
-        &["C_yx", "C_zx", "C_zy", "undetermined", "add poses"],
-    );
-}
-
-#[test]
-fn with_the_turns_between_them_six_faces_by_hand_have_the_scale_factors_and_biases_of_imucal() {
-    let Some(fit) = by_hand("sample,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z") else {
-        return;
-    };
-    let fit = fit.expect("the turns say what the faces lack");
-    let found = fit.sensor(Sensor::Accel).expect("it was recorded");
-    let physical = found.estimated.triad.physical(mimu::triad::Angles::Exact);
-    let data = data_set("imucal_ferraris").expect("it was there");
-    let published = Published::read(&data.join("legacy_calibration_pre_2.0.json"), 1.0).accel;
-    // imucal's input has 2048 counts per g.
-    let counts = 2048.0 / GRAVITY;
-    for i in 0..3 {
-        let scale = published.matrix.row(i).norm() / counts;
-        let bias = published.offset[i] / counts;
-        let (s, b) = (physical.scale[i], physical.bias[i]);
-        // imucal takes the faces to be level. A degree off level changes a scale factor by 1.5e-4, and a bias by 1.5 mm/s² plus the difference
-        // between the two ends of an axis.
-        assert!((s.value - scale).abs() < 5e-4, "{} {scale}", s.value);
-        assert!((b.value - bias).abs() < 5e-3, "{} {bias}", b.value);
-    }
 }

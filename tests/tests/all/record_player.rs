@@ -221,19 +221,3 @@ fn fit_warnings(prepared: Prepared) -> String {
         Err(error) => error.to_string(),
     }
 }
-
-#[test]
-fn a_rate_beyond_the_range_of_the_gyro_is_refused_with_a_dwell_that_shows_it() {
-    let plan = bench::record_player_plan(14, [0.0; 2], SEED);
-    let mut file = unit(SEED);
-    for row in &mut file.unit.gyro_affine.as_mut().expect("given").matrix {
-        for element in row {
-            *element *= 2.0;
-        }
-    }
-    let prepared = bench::on_a_turntable(&plan, &file, SEED, turntable("200,270", 0.001));
-    let error = fit(prepared, Options::default())
-        .expect_err("is refused")
-        .to_string();
-    assert!(error.contains("exceeds the range of the gyro"), "{error}");
-}

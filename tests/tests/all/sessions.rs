@@ -1,7 +1,5 @@
 //! Several sessions of one unit: what they predict, and what is named.
 
-use std::ffi::OsStr;
-
 use mimu::judgement::{Judgement, JudgementKind};
 use mimu::sessions::Sessions;
 use mimu::sessions::class::PartClass;
@@ -10,7 +8,7 @@ use mimu::{Calibration, Sensor, verify};
 use mimu_tests::says;
 use mimu_tests::sessions::{
     ARRAY_UNITS, Carrier, Life, Shares, by_others, by_single, losing, of_array, of_model, of_next,
-    on_bench, recorded, study,
+    on_bench, study,
 };
 use rayon::prelude::*;
 
@@ -56,127 +54,6 @@ fn a_unit_that_ages_was_not_dropped() {
         );
         let used = all.used.iter().filter(|used| **used).count();
         assert!(used >= 6, "{seed}: {:?} {:?}", all.used, all.sentences());
-    }
-}
-
-/// Turns that lose samples, and how many samples each: by hand the fit forgives two turns.
-fn losses(carrier: Carrier) -> [usize; 2] {
-    match carrier {
-        Carrier::Table => [2, 2],
-        Carrier::Hands => [5, 4],
-    }
-}
-
-fn permutations(n: usize) -> Vec<Vec<usize>> {
-    let longer = |all: Vec<Vec<usize>>, _| {
-        let each = all.into_iter().flat_map(|order| {
-            let unused = (0..n).filter({
-                let order = order.clone();
-                move |k| !order.contains(k)
-            });
-            unused.map(move |k| [&order[..], &[k]].concat())
-        });
-        each.collect()
-    };
-    (0..n).fold(vec![Vec::new()], longer)
-}
-
-#[test]
-fn sessions_that_lost_samples_contradict_themselves_and_no_order_changes_the_answer() {
-    for carrier in Carrier::ALL {
-        let session = |number: u32| {
-            let lossy = number >= 2;
-            losing(
-                carrier,
-                (11, Life::Constant, number),
-                if lossy { losses(carrier) } else { [0, 0] },
-            )
-        };
-        let fits: Vec<_> = (0..4).map(session).collect();
-        let clean = combined(fits[..2].to_vec());
-        for order in permutations(4) {
-            let all = combined(order.iter().map(|s| fits[*s].clone()).collect());
-            let used: Vec<bool> = order.iter().map(|s| *s < 2).collect();
-            assert_eq!(
-                all.used,
-                used,
-                "{carrier:?} {order:?}: {:?}",
-                all.sentences()
-            );
-            assert!(all.findings.is_empty(), "{:?}", all.sentences());
-            for ((sensor, triad), (_, of_clean)) in all.triads.present().zip(clean.triads.present())
-            {
-                let sizes = of_clean.common.physical(mimu::Angles::Exact).scale;
-                for (i, (a, b)) in triad.predicted.iter().zip(&of_clean.predicted).enumerate() {
-                    let [a, b] = [a, b].map(|m| m.variance.sqrt());
-                    assert!((a / b - 1.0).abs() < 1e-9, "{sensor} {i}: {a} {b}");
-                }
-                let off = triad.common.forward.matrix - of_clean.common.forward.matrix;
-                let off = off.abs().max().max(
-                    (triad.common.forward.bias - of_clean.common.forward.bias)
-                        .abs()
-                        .max(),
-                );
-                assert!(
-                    off < 1e-9 * sizes[0].value,
-                    "{carrier:?} {order:?} {sensor}: {off}"
-                );
-            }
-            let made =
-                Calibration::of_sessions(&all, "2026-01-01T00:00:00Z").expect("a calibration");
-            let said = &made.judgement.reason;
-            assert_eq!(made.judgement.kind, JudgementKind::Suspect, "{said}");
-            says(said, &["contradict themselves and are not used: gyro: "]);
-        }
-        // One that is good is enough to show it; two that are bad alike may be what the model lacks.
-        let few = |which: &[usize]| combined(which.iter().map(|s| fits[*s].clone()).collect());
-        assert_eq!(few(&[3, 1]).used, [false, true]);
-        let alike = few(&[2, 3]);
-        assert_eq!(alike.used, [true, true]);
-        let made = Calibration::of_sessions(&alike, "2026-01-01T00:00:00Z").expect("a calibration");
-        assert!(
-            made.judgement.kind >= JudgementKind::Unexplained,
-            "{}",
-            made.judgement
-        );
-    }
-}
-
-#[test]
-fn a_shock_is_found_beside_a_session_that_contradicts_itself() {
-    // Before the shock, directly after it, and last. Sessions 0 and 1 were before it.
-    for (lossy, said) in [
-        (1, "sessions 3 and 4"),
-        (2, "sessions 2 and 4"),
-        (5, "sessions 2 and 3"),
-    ] {
-        let session = |k: u32| {
-            let number = if lossy == 1 && k > 0 { k - 1 } else { k };
-            let lost = if k == lossy {
-                losses(Carrier::Hands)
-            } else {
-                [0, 0]
-            };
-            losing(Carrier::Hands, (1, Life::Dropped, number), lost)
-        };
-        let all = combined((0..6).map(session).collect());
-        let sentences = all.sentences();
-        let first = if lossy == 1 { 3 } else { 2 };
-        let used: Vec<bool> = (0..6).map(|k| k >= first && k != lossy).collect();
-        assert_eq!(all.used, used, "{sentences:?}");
-        assert!(
-            sentences[1].contains(&format!("between {said} the unit changed")),
-            "{sentences:?}"
-        );
-        let because = all.not_used(lossy as usize);
-        assert_eq!(
-            (all.not_used(0), because),
-            (Some("before_step"), Some("contradicts_itself"))
-        );
-        assert!(
-            sentences[0].starts_with(&format!("session {} contradicts itself", lossy + 1)),
-            "{sentences:?}"
-        );
     }
 }
 
@@ -308,58 +185,6 @@ fn a_temperature_that_nobody_records_is_named() {
     assert!(found.share > 0.6 && found.p < 0.01, "{found:?}");
     let named = all.sentences().iter().any(|s| s.contains("temperature"));
     assert!(named, "{:?}", all.sentences());
-}
-
-#[test]
-fn the_command_makes_one_calibration_of_several_recordings_and_its_export_means_tomorrow() {
-    let folders = recorded(5, Life::PowerOn, 3);
-    let out = tempfile::tempdir().expect("a folder");
-    let [cal, json, header] = ["cal.toml", "fit.json", "cal.h"].map(|f| out.path().join(f));
-    let run = |arguments: &[&OsStr]| {
-        let all = std::iter::once(OsStr::new("mimu")).chain(arguments.iter().copied());
-        mimu_cli::run(all.map(OsStr::to_owned))
-    };
-    let recordings: Vec<_> = folders.iter().map(|f| f.path().join("recording")).collect();
-    let mut arguments: Vec<&OsStr> = vec!["fit".as_ref()];
-    arguments.extend(recordings.iter().map(|r| r.as_os_str()));
-    arguments.extend([
-        "-o".as_ref(),
-        cal.as_os_str(),
-        "--json".as_ref(),
-        json.as_os_str(),
-    ]);
-    assert_eq!(run(&arguments), 0);
-    let text = std::fs::read_to_string(&json).expect("JSON");
-    let found: serde_json::Value = serde_json::from_str(&text).expect("JSON");
-    assert_eq!(found["format"], "mimu-fit-sessions/1");
-    assert_eq!(found["sessions"].as_array().map(Vec::len), Some(3));
-    let parameters = found["sensors"]["gyro"]["parameters"].as_array();
-    for parameter in parameters.expect("a list") {
-        let number = |key: &str| parameter[key].as_f64().expect("a number");
-        let next = parameter["next_power_on"].as_array().expect("an interval");
-        let next: Vec<f64> = next.iter().filter_map(|x| x.as_f64()).collect();
-        let wider = next[0] < number("lower") && number("upper") < next[1];
-        assert!(wider, "{parameter}");
-        assert_eq!(parameter["sessions"].as_array().map(Vec::len), Some(3));
-    }
-    let export = [
-        "export".as_ref(),
-        "c".as_ref(),
-        "--calibration".as_ref(),
-        cal.as_os_str(),
-        "-o".as_ref(),
-        header.as_os_str(),
-    ];
-    assert_eq!(run(&export), 0);
-    let header = std::fs::read_to_string(&header).expect("a header");
-    assert!(header.contains("at the next power-on"), "{header}");
-    // One recording twice is no second session.
-    let twice = [
-        "fit".as_ref(),
-        recordings[0].as_os_str(),
-        recordings[0].as_os_str(),
-    ];
-    assert_eq!(run(&twice), 1);
 }
 
 #[test]

@@ -6,7 +6,6 @@ use mimu::diagnose::rejected::Reason;
 use mimu::diagnose::{Diagnosis, Recordings, Verdict, diagnose};
 use mimu::fit::Options;
 use mimu::prepared::Prepared;
-use mimu::quantity::Sensor;
 use mimu::signal::stillness::STILL_FACTOR;
 use mimu_recording::RawUnit;
 use mimu_rig::rig_file::RigFile;
@@ -66,25 +65,6 @@ fn biases_that_change_between_recordings_are_no_effect() {
     let file = unit(&[], 3);
     let found = together(session(&file, 31), vec![session(&file, 32)]);
     assert_eq!(found.verdict, Verdict::Clean, "{:?}", ids(&found));
-}
-
-#[test]
-#[ignore = "nightly: three diagnoses"]
-fn two_recordings_know_an_effect_better_than_one_by_the_root_of_two() {
-    let file = unit(&["accel_scale_quadratic"], 5);
-    let alone = diagnose(session(&file, 51).into(), Options::IN_SAMPLE).expect("a diagnosis");
-    let both = together(session(&file, 51), vec![session(&file, 52)]);
-    assert_eq!(ids(&alone), ["accel_scale_quadratic"]);
-    assert_eq!(ids(&both), ["accel_scale_quadratic"]);
-    let sigmas = |d: &Diagnosis| {
-        let accel = d.sensors.iter().find(|s| s.sensor == Sensor::Accel);
-        accel.expect("there").decision.accepted[0]
-            .covariance
-            .clone()
-    };
-    let ratio = (sigmas(&alone).trace() / sigmas(&both).trace()).sqrt();
-    // Each session has its own wander. The ratio is exactly the root of two, apart from how often each pose was taken.
-    assert!((1.3..1.55).contains(&ratio), "{ratio}");
 }
 
 #[test]

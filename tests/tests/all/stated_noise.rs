@@ -2,12 +2,10 @@
 
 use mimu::fit::{Options, fit};
 use mimu::noise::noise_file::NoiseFile;
-use mimu::plan::design::budget::DwellNoise;
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
 use mimu::warning::Warning;
 use mimu_tests::bench;
-use mimu_tests::says;
 
 const SEED: u64 = 3;
 
@@ -22,15 +20,6 @@ fn recorded() -> (Prepared, NoiseFile) {
 fn gyro_floor(prepared: Prepared) -> f64 {
     let fitted = fit(prepared, Options::IN_SAMPLE).unwrap();
     fitted.sensor(Sensor::Gyro).unwrap().noise_floor()
-}
-
-#[test]
-fn a_noise_file_in_another_unit_is_refused_with_its_channel() {
-    let (prepared, mut noise) = recorded();
-    noise.channel[4].unit = "m/s^2".into();
-    let error = prepared.with_noise(&noise).unwrap_err();
-    assert!(error.refused().place.contains("accel_y"), "{error}");
-    says(&error.refused().problem, &["that of the readings is V"]);
 }
 
 #[test]
@@ -109,50 +98,4 @@ fn noise_is_that_of_the_temperature_of_the_dwell() {
             "{temp_c}"
         );
     }
-}
-
-#[test]
-fn the_useful_dwell_is_where_the_curve_is_within_five_per_cent_of_its_least() {
-    for noise in [
-        DwellNoise {
-            n: 1e-3,
-            b: 0.0,
-            k: 1e-4,
-        },
-        DwellNoise {
-            n: 1e-3,
-            b: 3e-4,
-            k: 0.0,
-        },
-        DwellNoise {
-            n: 1e-3,
-            b: 1e-4,
-            k: 2e-5,
-        },
-    ] {
-        let useful = noise.useful_s().unwrap();
-        let least = (0..6000)
-            .map(|i| noise.sigma(1.002_f64.powi(i)))
-            .fold(f64::INFINITY, f64::min);
-        // If only a floor is left, it is approached but never reached.
-        let least = if noise.k > 0.0 {
-            least
-        } else {
-            noise.sigma(1e12)
-        };
-        assert!(
-            (noise.sigma(useful) / least / 1.05 - 1.0).abs() < 1e-3,
-            "{noise:?}: {useful}"
-        );
-        assert!(noise.sigma(0.9 * useful) > noise.sigma(useful));
-    }
-    assert_eq!(
-        DwellNoise {
-            n: 1e-3,
-            b: 0.0,
-            k: 0.0
-        }
-        .useful_s(),
-        None
-    );
 }

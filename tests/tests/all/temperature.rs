@@ -7,12 +7,9 @@ use mimu::calibration::Calibration;
 use mimu::diagnose::decision::Accepted;
 use mimu::diagnose::{Diagnosis, Recordings, diagnose};
 use mimu::fit::{Options, fit};
-use mimu::plan::next_experiment::next;
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
-use mimu::result::diagnosis::DiagnosisResult;
 use mimu::warning::Warning;
-use mimu_cli::report::{Detail, Made, diagnosis_page, diagnosis_text};
 use mimu_recording::Recorded;
 use mimu_rig::random::Random;
 use mimu_rig::rig_file::{EffectFile, RigFile, RigTruth};
@@ -145,37 +142,6 @@ fn a_sweep_that_moves_the_bias_by_more_than_the_rates_is_fitted_and_its_effect_i
     );
 }
 
-#[test]
-fn a_sweep_whose_readings_follow_no_input_is_refused_though_they_follow_the_temperature() {
-    // Rates assigned to the wrong dwells, and a gyro that reads only its temperature.
-    let mut shuffled = chamber(2);
-    let inputs: Vec<[f64; 6]> = shuffled.dwells.list.iter().map(|d| d.reference).collect();
-    let n = inputs.len();
-    for (i, dwell) in shuffled.dwells.list.iter_mut().enumerate() {
-        dwell.reference = inputs[(i * 7 + 3) % n];
-    }
-    let mut dead = chamber(2);
-    let still = dead.dwells.list.len() - 6;
-    for i in still..dead.dwells.list.len() {
-        let before: Vec<f64> = (0..3)
-            .map(|k| dead.dwells.list[still - 1].raw[k].mean)
-            .collect();
-        for (k, mean) in before.into_iter().enumerate() {
-            dead.dwells.list[i].raw[k].mean = mean;
-        }
-    }
-    for recording in [shuffled, dead] {
-        let only = Options {
-            only: Some(Sensor::Gyro),
-            ..Options::IN_SAMPLE
-        };
-        let refused = fit(recording, only)
-            .expect_err("no calibration")
-            .to_string();
-        says(&refused, &["do not follow the known inputs"]);
-    }
-}
-
 /// How often intervals contained the truth: lags and coefficients.
 #[derive(Debug, Default)]
 struct Held {
@@ -255,58 +221,11 @@ fn intervals_of_a_lag_and_of_its_coefficients_hold_the_truth() {
     );
 }
 
-#[test]
-fn the_interval_of_a_lag_is_in_the_json_the_text_and_the_page() {
-    let found = diagnosed(lagging(3).1, None);
-    let result = DiagnosisResult::of(&found, &next(&found), None);
-    let lag = result
-        .effects
-        .iter()
-        .find(|e| e.effect.id() == "gyro_thermal_lag");
-    let form = lag
-        .and_then(|l| l.effect.nonlinear_parameter())
-        .expect("a lag");
-    let json = serde_json::to_value(&form).expect("JSON");
-    let [lower, upper] = ["lower", "upper"].map(|k| json[k].as_f64().expect("an end"));
-    assert!(lower < form.value && form.value < upper, "{json}");
-    let made = Made {
-        recording: "lagging".into(),
-        command: "mimu diagnose lagging".into(),
-        created: "2026-01-01T00:00:00Z".into(),
-    };
-    let interval = form.interval();
-    assert!(
-        diagnosis_text(
-            &result,
-            Detail {
-                all: true,
-                next: false
-            }
-        )
-        .contains(&format!("(95 %: {interval})"))
-    );
-    assert!(diagnosis_page(&result, &made).contains(&interval));
-}
-
 /// A calibration of `file` from a short recording at one temperature.
 fn short(file: &RigFile, seed: u64) -> Calibration {
     let plan = plan(&faces(&[-60.0, 60.0]), 1.5, &[[0.0, 25.0]]);
     let fitted = fit(recorded(&plan, file, seed), Options::IN_SAMPLE).expect("a fit");
     Calibration::of(&fitted, &[], "2026-01-01T00:00:00Z").expect("a calibration")
-}
-
-#[test]
-fn nothing_is_found_in_what_a_given_matrix_leaves_open() {
-    for seed in 0..2 {
-        let file = unit(&[], seed);
-        let given = short(&file, seed);
-        let rates = [-280.0, -200.0, -100.0, 100.0, 200.0, 280.0];
-        let steps = randomised([faces(&rates), faces(&rates)].concat(), seed);
-        let chamber = [[0.0, 20.0], [150.0, 30.0], [300.0, 20.0]];
-        let long = recorded(&plan(&steps, 6.0, &chamber), &file, 100 + seed);
-        let found = diagnosed(long, Some(&given));
-        assert_eq!(ids(&found), [""; 0], "seed {seed}");
-    }
 }
 
 #[test]

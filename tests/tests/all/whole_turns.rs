@@ -4,7 +4,6 @@ use mimu::calibration::Calibration;
 use mimu::calibration::verify::verify;
 use mimu::fit::{Options, fit};
 use mimu::quantity::Sensor;
-use mimu::warning::Warning;
 use mimu_recording::WholeTurns;
 use mimu_tests::by_hand::{Grade, unit};
 use mimu_tests::whole_turns::{Session, case, recorded, scales};
@@ -64,13 +63,6 @@ fn whole_turns_make_the_scale_factors_of_the_same_recording_more_certain() {
 }
 
 #[test]
-fn whole_turns_alone_give_the_scale_factors() {
-    let (turns, inside) = row(Grade::Consumer, Session::TURNS, 0..12);
-    assert!(turns < 0.001, "{turns}");
-    assert!(inside > 0.9, "{inside}");
-}
-
-#[test]
 #[ignore = "half an hour; prints what each minute buys"]
 fn what_whole_turns_buy() {
     let with = |turns| Session {
@@ -119,29 +111,6 @@ fn a_miscounted_turn_is_named_and_does_no_harm() {
     );
     let scales = scales(&fitted, &file, 3, &plan);
     assert!((0..3).all(|k| scales.errors[k].abs() < 1e-3), "{scales:?}");
-}
-
-/// Whoever stops half-way rests there, and the next turn begins where this one stopped.
-#[test]
-fn a_rest_within_a_turn_does_no_harm() {
-    let file = unit(&[], Grade::Consumer, 3);
-    let about = "\nabout = [0.0, 0.0, 1.0]\ndwell_s = 2.0\n";
-    let plan = Session::POSES_AND_TURNS.plan();
-    let whole = format!("[[step]]\nwhole_turns = 10{about}");
-    assert!(plan.contains(&whole), "{plan}");
-    let parts = ["4.6", "5.4"].map(|turns| format!("[[step]]\nwhole_turns = {turns}{about}"));
-    let plan = plan.replace(&whole, &parts.concat());
-    let stated = Some(WholeTurns::default());
-    let fitted = fit(recorded(&file, &plan, 3, stated), Options::IN_SAMPLE).unwrap();
-    let told: Vec<String> = fitted.all_warnings().map(ToString::to_string).collect();
-    assert!(
-        !told.iter().any(|w| w.contains("from where they began")),
-        "{told:?}"
-    );
-    let scales = scales(&fitted, &file, 3, &plan);
-    for (error, half) in scales.errors.iter().zip(scales.half_widths) {
-        assert!(error.abs() < 2.0 * half && half < 3e-4, "{error} {half}");
-    }
 }
 
 #[test]
@@ -193,47 +162,6 @@ fn turns_that_all_end_short_are_not_taken_for_a_scale_factor() {
             .any(|w| w.contains("by the turns between rests"));
         assert!(none || contradicted, "{seed}: {told:?}");
     }
-}
-
-#[test]
-fn headings_that_scatter_more_than_stated_widen_the_intervals() {
-    let inside = (20..40).into_par_iter().map(|seed| {
-        let mut file = unit(&[], Grade::Consumer, seed);
-        file.hands.put_back_deg = 2.0;
-        let plan = Session::POSES_AND_TURNS.plan();
-        let stated = Some(WholeTurns::default());
-        let fitted = fit(recorded(&file, &plan, seed, stated), Options::IN_SAMPLE).unwrap();
-        scales(&fitted, &file, seed, &plan).inside
-    });
-    let inside: u32 = inside.sum();
-    println!("{inside} of 240");
-    assert!(inside >= 216, "{inside} of 240");
-}
-
-#[test]
-fn clipped_turns_are_refused_with_the_rate_not_to_exceed() {
-    let mut file = unit(&[], Grade::Consumer, 5);
-    // Twice as fast as the range of ±250 deg/s allows.
-    file.hands.whole_turn_s = [1.0, 1.2];
-    let plan = Session::POSES_AND_TURNS.plan();
-    let fitted = fit(
-        recorded(&file, &plan, 5, Some(WholeTurns::default())),
-        Options::IN_SAMPLE,
-    )
-    .unwrap();
-    let clipped: Vec<f64> = fitted
-        .all_warnings()
-        .filter_map(|w| match w {
-            Warning::WholeTurnClipped { fastest, .. } => Some(fastest.to_degrees()),
-            _ => None,
-        })
-        .collect();
-    println!("{clipped:?}");
-    assert_eq!(clipped.len(), 6);
-    assert!(
-        clipped.iter().all(|rate| (225.0..600.0).contains(rate)),
-        "{clipped:?}"
-    );
 }
 
 #[test]

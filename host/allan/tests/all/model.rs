@@ -260,19 +260,6 @@ fn intervals_and_bounds_hold_the_truth() {
 }
 
 #[test]
-fn a_ramp_without_noise_is_found_to_the_digits_of_the_curve() {
-    let truth = Truth {
-        r: 3e-4,
-        samples: 4096,
-        ..Truth::default()
-    };
-    let found = &models(&truth, 0.01, 1)[0];
-    let r = found.get(Term::R).unwrap();
-    assert!((r.value / 3e-4 - 1.0).abs() < 1e-6, "{found:?}");
-    assert!(found.get(Term::N).is_err() && found.get(Term::B).is_err());
-}
-
-#[test]
 fn white_noise_behind_a_filter_keeps_its_coefficient_and_is_no_quantization() {
     let estimator = Estimator::new(1 << 15, 1.0, 0.95);
     let outside = |seed: u64| {
@@ -299,21 +286,6 @@ fn white_noise_behind_a_filter_keeps_its_coefficient_and_is_no_quantization() {
         .filter(|seed| outside(*seed))
         .count();
     assert!(outside <= 20, "{outside}");
-}
-
-#[test]
-fn a_vibration_is_told_to_be_none_of_the_terms() {
-    let truth = Truth {
-        n: 1.0,
-        samples: 1 << 14,
-        ..Truth::default()
-    };
-    let mut rates = series(&truth, 1.0, 1);
-    for (i, rate) in rates.iter_mut().enumerate() {
-        *rate += 2.0 * (i as f64 * std::f64::consts::TAU / 900.0).sin();
-    }
-    let model = fitted(&Estimator::new(1 << 14, 1.0, 0.95), &rates);
-    assert!(model.excess.is_some(), "{model:?}");
 }
 
 #[test]

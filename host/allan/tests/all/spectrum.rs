@@ -222,36 +222,7 @@ fn a_strong_line_spoils_the_curve_and_the_spectrum_beside_it_still_gives_the_whi
 }
 
 #[test]
-fn beside_a_bump_the_white_band_gives_the_white_noise() {
-    for [width_hz, rms] in BUMPS {
-        let held = beside_bump(width_hz, rms, 40);
-        assert!(held >= least(40), "{width_hz}: {held} of 40");
-    }
-}
-
-#[test]
 fn behind_a_filter_the_white_band_ends_below_its_corner_and_holds_the_white_noise() {
     let held = behind_filter(10.0, 60);
     assert!(held >= least(60), "{held} of 60");
-}
-
-#[test]
-fn harmonics_of_the_mains_are_lines_each() {
-    let mut rates = noise([1.0, 0.0, 0.0], SAMPLES, 1);
-    for (hz, rms) in [(8.3, 2.0), (16.6, 1.0), (24.9, 0.5)] {
-        add_line(&mut rates, hz, rms, 1);
-    }
-    let found = Lines::of(&rates, DT_S, 0.95);
-    let frequencies: Vec<f64> = found.lines.iter().map(|l| l.frequency_hz).collect();
-    assert!(frequencies.len() == 3, "{found:?}");
-    for (found, known) in frequencies.iter().zip([8.3, 16.6, 24.9]) {
-        assert!((found - known).abs() < 1e-3, "{frequencies:?}");
-    }
-}
-
-#[test]
-fn a_record_too_short_for_a_spectrum_says_so() {
-    let found = Lines::of(&noise([1.0, 0.0, 0.0], 500, 1), DT_S, 0.95);
-    assert!(found.searched_hz.is_none() && found.lines.is_empty());
-    assert!(found.white_band(DT_S, 0.95).is_none());
 }

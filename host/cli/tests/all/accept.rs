@@ -318,8 +318,8 @@ fn board(rows: Vec<Row>) -> String {
 #[test]
 fn boards_at_several_ports_are_measured_together() {
     let folder = place();
-    let good = board(rows(&GOOD, &[UP], 25.0, 5));
-    let bad = board(rows(&BAD, &[UP], 25.0, 6));
+    let good = board(rows(&GOOD, &[UP], 120.0, 5));
+    let bad = board(rows(&BAD, &[UP], 120.0, 6));
     let arguments = format!(
         "accept --port {good} --port {bad} --text t_us,ax,ay,az,gx,gy,gz --device line \
          --limits limits.toml --for 5s --gravity 9.80665 -o results"

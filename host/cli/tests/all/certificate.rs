@@ -179,24 +179,3 @@ fn the_same_calibration_as_found_has_not_changed_and_another_file_is_refused() {
     );
     assert!(!at.join("other.html").exists());
 }
-
-#[test]
-fn one_error_names_all_that_a_certificate_lacks() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
-    on_table(at, "rec", 1, "");
-    let text = PARTICULARS
-        .replace("number = \"2026-117\"", "")
-        .replace("address = \"2 Short Road\"", "");
-    std::fs::write(at.join("lab.toml"), text).unwrap();
-    let said = mimu(at, "report rec --certificate lab.toml -o page.html").stderr;
-    says(
-        &said,
-        &["lab.toml: a certificate needs number, customer.address, traceability;"],
-    );
-    assert!(!at.join("page.html").exists());
-    says(
-        &mimu(at, "report rec rec --certificate lab.toml -o page.html").stderr,
-        &["a certificate is made from one, and 2 are given"],
-    );
-}

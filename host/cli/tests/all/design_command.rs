@@ -28,34 +28,6 @@ fn json_has_the_agreed_keys_and_sigmas_in_si() {
 }
 
 #[test]
-fn people_read_the_same_numbers_in_their_units() {
-    // Six faces: bias ± 1.96 σ/√6, scale factor ± 1.96 σ/(√2 g), P_xy the same in µrad.
-    let text = |arguments: &str| {
-        let all = format!("{arguments} --verbose");
-        mimu(Path::new("."), &all).stdout
-    };
-    let accel = text("-n 6 --sigma 0.01");
-    for says in [
-        "b_x ± 0.816 mg",
-        "P_xx ± 1413 ppm",
-        "P_xy ± 1413 µrad",
-        "1.02 mg, given",
-    ] {
-        assert!(accel.contains(says), "{says}: {accel}");
-    }
-    // At 300 deg/s: in deg/s, and as a fraction.
-    let gyro = text("-n 6 --sensor gyro --sigma 0.001");
-    for says in [
-        "b_z ± 0.0458 deg/s",
-        "P_zz ± 265 ppm",
-        "P_zy ± 265 µrad",
-        "0.0573 deg/s, given",
-    ] {
-        assert!(gyro.contains(says), "{says}: {gyro}");
-    }
-}
-
-#[test]
 fn the_plan_is_the_design() {
     let folder = tempfile::tempdir().unwrap();
     let arguments = "--sensor gyro -n 8 --dwell 12.5 -o plan.toml --json plan.json";
@@ -85,39 +57,6 @@ fn the_plan_is_the_design() {
     }
     // Nothing else was left in the folder.
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2);
-}
-
-#[test]
-fn text_fits_a_hundred_columns() {
-    let all = [
-        "-n 20 --table two-axis --reference gravity",
-        "-n 200 --seed 18446744073709551615",
-        "--budget 10",
-        "-n 14 --sensor gyro --walk 0.0001",
-        "-n 16 --reference gravity",
-    ];
-    for arguments in all {
-        let out = mimu(Path::new("."), arguments);
-        assert_eq!(out.status, Some(0), "{arguments}: {}", out.stderr);
-        let text = out.stdout;
-        assert!(text.lines().count() <= 25, "{arguments}: {text}");
-        for line in text.lines() {
-            assert!(line.chars().count() <= 100, "{arguments}: {line}");
-        }
-    }
-}
-
-#[test]
-fn a_lot_is_drawn_by_the_seed() {
-    let [one, two, again] = [1, 2, 1].map(|seed| json(&format!("-n 6 --seed {seed}")));
-    assert_eq!(one["order"], "randomised");
-    // Six faces: in a different order for another seed, in the same order for the same seed.
-    let sorted = |design: &serde_json::Value| {
-        let mut list = design["positions"].as_array().unwrap().clone();
-        list.sort_by_key(ToString::to_string);
-        list
-    };
-    assert!(one == again && one["positions"] != two["positions"] && sorted(&one) == sorted(&two));
 }
 
 #[test]

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
-use super::command::{self, all_refused, says};
+use super::command::{self, all_refused};
 
 /// 0.8 % of 1665 counts per m/s², 4 mrad, 0.2 m/s².
 const SIZES: [f64; 9] = [13.32, 13.32, 13.32, 4e-3, 4e-3, 4e-3, 333.0, 333.0, 333.0];
@@ -56,51 +56,6 @@ fn json(folder: &Path, arguments: &str) -> serde_json::Value {
 }
 
 #[test]
-fn six_poses_are_designed_beside_the_population_alone() {
-    let folder = folder();
-    let design = json(folder.path(), "--prior kind.toml -n 6 --sigma 0.0015");
-    assert_eq!(design["positions"].as_array().unwrap().len(), 6);
-    assert_eq!(
-        (&design["reference"], &design["table"]),
-        (&"gravity".into(), &"hand".into())
-    );
-    assert_eq!(design["prior"]["units"], 60);
-    // The optimum depends on the number of dwells.
-    assert!(design["d_efficiency"].is_null() && design["determinant"].is_null());
-    let known = [
-        ("C_yy", 1.96 * 0.008),
-        ("C_zx", 1.96 * 4e-3),
-        ("o_z", 1.96 * 0.2),
-    ];
-    for (name, half) in known {
-        let all = design["sigma_per_parameter"].as_array().unwrap();
-        let found = all.iter().find(|p| p["name"] == name).unwrap();
-        let alone = found["population_half_width_95"].as_f64().unwrap();
-        assert!((alone / half - 1.0).abs() < 1e-4, "{name}: {alone}");
-        // Six faces leave the angles to the population.
-        let share = found["half_width_95"].as_f64().unwrap() / alone;
-        assert!(
-            share <= 1.0 && (share < 0.1 || name == "C_zx"),
-            "{name}: {share}"
-        );
-    }
-    // Nine dwells at least without a prior.
-    assert!(design["prior"]["dwells_without"].as_u64().unwrap() >= 9);
-    let by = design["prior"]["by_dwells"].as_array().unwrap();
-    let six = by.iter().find(|b| b["dwells"] == 6).unwrap();
-    assert!(six["without"].is_null() && six["with"]["scale"].is_number());
-    assert!(by.iter().find(|b| b["dwells"] == 9).unwrap()["without"]["scale"].is_number());
-    // Without a prior nothing has changed.
-    let without = json(folder.path(), "-n 12 --table hand");
-    assert!(without["d_efficiency"].is_number() && without.get("prior").is_none());
-    assert!(
-        without["sigma_per_parameter"][0]
-            .get("population_half_width_95")
-            .is_none()
-    );
-}
-
-#[test]
 fn without_a_number_the_plan_has_the_fewest_dwells_for_the_targets() {
     let folder = folder();
     let of = |arguments: &str| {
@@ -140,57 +95,6 @@ fn without_a_number_the_plan_has_the_fewest_dwells_for_the_targets() {
         .unwrap();
     assert_eq!(plan["carrier"].as_str(), Some("hands"));
     assert_eq!(plan["step"].as_array().unwrap().len(), dwells);
-}
-
-#[test]
-fn a_budget_and_six_faces_count_the_prior() {
-    let folder = folder();
-    let budget = json(folder.path(), "--prior kind.toml --budget 1");
-    assert!(budget["time_s"].as_f64().unwrap() <= 60.0);
-    let ways = budget["budget"]["ways"].as_array().unwrap();
-    assert_eq!(ways[0]["dwells_a_pass"], 3);
-    let faces = json(folder.path(), "--prior kind.toml -n 6");
-    assert_eq!(faces["undetermined"].as_array().unwrap().len(), 0);
-    // Faces do not show angles: these remain what the population says.
-    let all = faces["sigma_per_parameter"].as_array().unwrap();
-    let angle = all.iter().find(|p| p["name"] == "C_zy").unwrap();
-    let share = angle["half_width_95"].as_f64().unwrap()
-        / angle["population_half_width_95"].as_f64().unwrap();
-    assert!(share > 0.9, "{share}");
-}
-
-#[test]
-fn people_read_both_half_widths_in_a_hundred_columns() {
-    let folder = folder();
-    for arguments in [
-        "--prior kind.toml",
-        "--prior kind.toml -n 3",
-        "--prior kind.toml -n 6 --noise 0.001",
-        "--prior unbiased.toml -n 20",
-        "--prior kind.toml --budget 5",
-    ] {
-        let short = text(folder.path(), arguments);
-        // The list of dwells is as long as the plan, three in a line.
-        let is_dwells = |l: &&str| l.trim_start().starts_with(|c: char| c.is_ascii_digit());
-        let others = short.lines().filter(|l| !is_dwells(l)).count();
-        assert!(others <= 26, "{arguments}: {others}\n{short}");
-        let long = text(folder.path(), &format!("{arguments} --verbose"));
-        for line in short.lines().chain(long.lines()) {
-            assert!(line.chars().count() <= 100, "{arguments}: {line}");
-        }
-        for says in ["of 60 units", "gyro", "brackets"] {
-            assert!(
-                short.contains(says) && long.contains(says),
-                "{says}: {short}"
-            );
-        }
-        assert!(!short.contains("NaN") && !long.contains("NaN"), "{long}");
-    }
-    let six = text(folder.path(), "--prior kind.toml -n 6");
-    // 1.96 × 0.8 %, 4 mrad, 20.4 mg.
-    says(&six, &["[15680]", "[7840]", "[40.0]"]);
-    let open = text(folder.path(), "--prior unbiased.toml -n 6");
-    says(&open, &["[open]", "nothing of the biases"]);
 }
 
 #[test]

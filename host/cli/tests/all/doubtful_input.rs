@@ -102,16 +102,6 @@ fn noise_of_readings_in_another_unit_than_declared_is_suspect_down_to_the_files_
 }
 
 #[test]
-fn a_record_too_short_for_a_noise_model_is_untested() {
-    let folder = tempfile::tempdir().unwrap();
-    at_rest(folder.path(), "rest", [1.0, 1.0], "SI");
-    for (to_s, expected) in [("0.7", "untested"), ("1.6", "untested"), ("950", "good")] {
-        let found = json(folder.path(), &format!("allan rest --to {to_s}"));
-        assert_eq!(kind(&found), expected, "{}", found["judgement"]);
-    }
-}
-
-#[test]
 fn noise_by_the_calibration_of_another_unit_is_suspect_and_is_not_exported_with_the_right_one() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();

@@ -161,46 +161,6 @@ fn units_that_are_given_hold_for_named_columns_too() {
 }
 
 #[test]
-fn poses_for_hands_are_in_words_and_say_whose_noise_is_assumed() {
-    let folder = tempfile::tempdir().unwrap();
-    let text = done(
-        folder.path(),
-        "design -n 12 --reference gravity --table hand",
-    );
-    assert!(
-        text.contains("face up") || text.contains("edge between"),
-        "{text}"
-    );
-    assert!(text.contains("up to 25 degrees off"), "{text}");
-    says(&text, &["that of an MMA7260QT: --noise takes yours"]);
-    assert!(
-        text.lines().all(|line| line.chars().count() <= 100),
-        "{text}"
-    );
-    let design = json(&done(
-        folder.path(),
-        "design -n 12 --reference gravity --json -",
-    ));
-    assert!(
-        design["d_efficiency"].as_f64().unwrap() > 0.96,
-        "{}",
-        design["d_efficiency"]
-    );
-    for up in design["positions"].as_array().unwrap() {
-        let parts = up
-            .as_array()
-            .unwrap()
-            .iter()
-            .map(|c| c.as_f64().unwrap().abs());
-        let parts: Vec<f64> = parts.filter(|c| *c > 1e-9).collect();
-        assert!(
-            parts.iter().all(|c| (c - parts[0]).abs() < 1e-9),
-            "{up}: no face, edge or corner"
-        );
-    }
-}
-
-#[test]
 fn a_table_is_compensated_into_a_table_with_its_stamps_and_its_other_columns() {
     let folder = log();
     let at = folder.path();

@@ -23,7 +23,6 @@ mod over_temperature;
 mod pocket_calculator;
 mod random;
 mod readme;
-mod thermal_command;
 mod thermal_plan_command;
 mod thermal_record_command;
 mod wizard;

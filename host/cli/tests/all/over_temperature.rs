@@ -213,19 +213,3 @@ fn a_compensated_recording_follows_the_dies() {
         }
     }
 }
-
-#[test]
-fn a_recording_without_temperatures_is_verified_by_the_one_model_and_says_so() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
-    calibrations(folder);
-    record(&folder.join("ramp"), false);
-    let samples = folder.join("ramp/samples.csv");
-    let text = std::fs::read_to_string(&samples).unwrap();
-    std::fs::write(&samples, text.replace(",25.000000,", ",,")).unwrap();
-    let json = verified(folder, "curves.toml");
-    let warnings = json["warnings"].to_string();
-    assert!(warnings.contains("no temp_c"), "{warnings}");
-    let floor = json["sensors"]["gyro"]["noise_floor"].as_f64().unwrap();
-    assert!(json["sensors"]["gyro"]["rms"].as_f64().unwrap() < 2.0 * floor);
-}

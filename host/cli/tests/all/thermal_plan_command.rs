@@ -5,7 +5,7 @@ use std::path::Path;
 use mimu_rig::plan::{Plan, Pose};
 use mimu_rig::table::{Table, TableTruth};
 
-use super::command::{self, Ran, says};
+use super::command::{self, Ran};
 
 fn mimu(folder: &Path, arguments: &str) -> Ran {
     command::mimu(folder, &format!("thermal plan {arguments}"))
@@ -57,15 +57,6 @@ fn nius_cycle_is_the_published_one() {
     let rounds = f64::from(plan.rounds);
     let round_s = (json["duration_s"].as_f64().unwrap() - plan.lead_in_s) / rounds;
     assert!((round_s - 152.0).abs() < 0.1, "{round_s}");
-}
-
-#[test]
-fn people_read_what_is_refused_and_what_is_inseparable() {
-    let folder = tempfile::tempdir().unwrap();
-    let out = mimu(folder.path(), "--procedure ramp --range 20..35");
-    out.refused(&["needs 20 K"]);
-    let out = mimu(folder.path(), "--procedure rest-ramp --range 0..50");
-    says(&out.stdout, &["inseparable: ", "not determined"]);
 }
 
 #[test]

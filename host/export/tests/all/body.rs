@@ -326,29 +326,6 @@ fn hobby_libraries_get_the_field_in_the_frame_of_the_gyro() {
 }
 
 #[test]
-fn a_second_unit_has_its_own_numbers_in_the_autopilots() {
-    // (v - 0.5) 1.25 for the accelerometer, v + 0.01 for the gyro, readings in SI.
-    let si = |name: &str, unit: &str, c: f64, o: f64| BodyTriad {
-        raw_unit: RawUnit::Si,
-        ..triad(name, unit, ONE.map(|row| row.map(|v| c * v)), [o, 0.0, 0.0])
-    };
-    let calibration = with([
-        si("gyro2", "rad/s", 1.0, 0.01),
-        si("accel2", "m/s^2", 1.125, -0.5625),
-        si("gyro5", "rad/s", 1.0, 0.0),
-    ]);
-    let export = Px4::export(&of(&calibration), &autopilot(None)).unwrap();
-    assert_near(values(&export, "CAL_GYRO1_#OFF"), [-0.01, 0.0, 0.0], 1e-8);
-    assert_near(values(&export, "CAL_ACC1_#OFF"), [0.5, 0.0, 0.0], 1e-7);
-    assert_near(values(&export, "CAL_ACC1_#SCALE"), [1.125; 3], 1e-7);
-    assert!(text(&export).contains("gyro5: the format has no place for it"));
-    let export = ArduPilot::export(&of(&calibration), &autopilot(None)).unwrap();
-    assert_near(values(&export, "INS_GYR2OFFS_#"), [-0.01, 0.0, 0.0], 1e-8);
-    assert_near(values(&export, "INS_ACC2OFFS_#"), [0.5, 0.0, 0.0], 1e-7);
-    assert_near(values(&export, "INS_ACC2SCAL_#"), [1.125; 3], 1e-7);
-}
-
-#[test]
 fn kalibr_gets_the_pose_and_the_time_of_a_second_unit() {
     let placed = |name: &str, unit: &str| BodyTriad {
         rotation_deg: Some(QUARTER),

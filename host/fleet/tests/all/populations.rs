@@ -91,33 +91,6 @@ fn three_strangers_of_one_kind_are_found_and_few_fleets_without_any_have_one() {
 }
 
 #[test]
-#[ignore = "nightly: 15,000 fleets"]
-fn strangers_by_size_of_fleet() {
-    println!("| units | parameters | fleets | with a false alarm, % | three strangers found, % |");
-    let sizes = [
-        (8, 9, 4000),
-        (12, 9, 3000),
-        (35, 9, 2000),
-        (36, 9, 1500),
-        (60, 9, 1000),
-        (48, 12, 1000),
-        (60, 12, 1000),
-        (300, 9, 300),
-        (1000, 12, 100),
-    ];
-    for (count, n, fleets) in sizes {
-        let (false_alarms, found) = named(count, n, fleets, 15.0);
-        println!(
-            "| {count} | {n} | {fleets} | {:.1} | {:.1} |",
-            100.0 * false_alarms,
-            100.0 * found
-        );
-        assert!(false_alarms < 0.03, "{count} units: {false_alarms}");
-        assert!(found > 0.9 || count < 30, "{count} units: {found}");
-    }
-}
-
-#[test]
 fn fewer_than_five_units_are_no_population() {
     let mut random = Random::new(3, "few");
     assert!(population::fit(&units(&mut random, 4, 3, 0.1), None).is_none());

@@ -122,33 +122,6 @@ fn a_bad_batch_a_drift_and_a_moved_fixture_are_found() {
 }
 
 #[test]
-fn strangers_are_named_with_what_shows_them() {
-    let faults = Faults {
-        stranger: 100,
-        far: 8.0,
-        ..Faults::default()
-    };
-    let plant = Plant {
-        faults,
-        ..Plant::new(1500, 3)
-    };
-    let fleet = result(&plant);
-    let truth: Vec<String> = (0..1500)
-        .filter(|k| plant.is_stranger(*k))
-        .map(|k| format!("u{k:05}"))
-        .collect();
-    let mut named: Vec<String> = fleet.strangers.iter().map(|s| s.unit.clone()).collect();
-    named.sort();
-    assert_eq!(named, truth);
-    assert!(
-        fleet
-            .strangers
-            .iter()
-            .all(|s| s.parameter.starts_with("scale") && s.change > 0.0)
-    );
-}
-
-#[test]
 fn operators_and_repetitions_are_separated_from_units() {
     let fleet = result(&Plant {
         repeated: 30,

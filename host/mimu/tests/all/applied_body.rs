@@ -109,25 +109,3 @@ fn further_triads_are_compensated_into_the_frame_of_the_first_and_keep_their_tim
     assert_eq!(rows, 400);
     std::fs::remove_dir_all(&folder).unwrap();
 }
-
-#[test]
-fn a_calibration_for_other_readings_of_a_further_triad_is_refused() {
-    let folder = std::env::temp_dir().join(format!("mimu-refused-{}", std::process::id()));
-    let recording = recorded(&folder.join("raw"), &["mag"]);
-    let mut made = calibration([0.0; 3], "unit");
-    made.body = vec![BodyTriad {
-        raw_unit: RawUnit::Count,
-        ..turned("mag", "uT")
-    }];
-    let refused = apply(
-        &recording,
-        &made,
-        &folder.join("out"),
-        SampleFormat::Csv,
-        true,
-        |_| (),
-    );
-    let error = refused.unwrap_err().to_string();
-    assert!(error.contains("readings of mag are in V"), "{error}");
-    std::fs::remove_dir_all(&folder).unwrap();
-}

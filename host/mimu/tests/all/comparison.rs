@@ -3,8 +3,6 @@
 use mimu::calibration::Calibration;
 use mimu::calibration::body::BodyTriad;
 use mimu::calibration::comparison::{Comparison, compare};
-use mimu::warning::Warning;
-use mimu_recording::{Manifest, RawUnit, Reference, UNNAMED};
 use mimu_rig::random::Random;
 
 /// Standard deviation of a bias, V.
@@ -104,35 +102,4 @@ fn the_repeatability_of_sixty_switch_ons_is_found() {
         .unwrap();
     let ratio = x.repeatability.unwrap() / (2.0 * SIGMA);
     assert!((0.7..1.3).contains(&ratio), "{ratio}");
-}
-
-#[test]
-fn other_units_and_other_readings_are_said() {
-    let a = ("a.toml".to_string(), calibration([2.5; 3], "one"));
-    let b = ("b.toml".to_string(), calibration([2.5; 3], "two"));
-    let found = compare(&[a.clone(), b]).unwrap();
-    assert!(found.notes[0].contains("two"), "{:?}", found.notes);
-    let alone = compare(&[a]).unwrap_err().to_string();
-    assert!(alone.contains("only one"), "{alone}");
-}
-
-#[test]
-fn a_unit_without_a_name_contradicts_no_name_and_a_note_says_that_nobody_checked() {
-    let recording =
-        |device: &str| Manifest::new(device, 100.0, 9.81, RawUnit::Volt, Reference::Gravity);
-    let [named, unnamed] = ["one", UNNAMED].map(|device| calibration([2.5; 3], device));
-    for (of, with, note) in [
-        (&unnamed, "one", Some([true, false])),
-        (&unnamed, UNNAMED, Some([true, true])),
-        (&named, UNNAMED, Some([false, true])),
-        (&named, "one", None),
-    ] {
-        let manifest = recording(with);
-        assert_eq!(of.other_unit(&manifest), None, "{with}");
-        let expected = note.map(|unnamed| Warning::UnnamedUnit { unnamed });
-        assert_eq!(of.unnamed_unit(&manifest), expected, "{with}");
-    }
-    assert!(named.other_unit(&recording("two")).is_some());
-    let both = [("a".to_string(), named), ("b".to_string(), unnamed)];
-    assert!(compare(&both).unwrap().notes.is_empty());
 }

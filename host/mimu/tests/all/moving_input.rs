@@ -157,25 +157,6 @@ fn a_unit_that_swings_about_level_axes_is_calibrated_by_the_reference_of_every_i
 }
 
 #[test]
-fn swings_tell_more_of_an_accelerometer_than_faces_alone() {
-    let sigma = |prepared| {
-        let fit = fitted(prepared);
-        let found = fit.sensor(Sensor::Accel).expect("recorded");
-        found.estimated.triad.forward_estimates()[1].sigma
-    };
-    let faces = {
-        let mut prepared = recorded(swing, none, 1.0, 1);
-        prepared.dwells.list.truncate(6);
-        prepared
-    };
-    let (with, without) = (sigma(recorded(swing, none, 1.0, 1)), sigma(faces));
-    assert!(
-        with < 0.65 * without,
-        "{with} with the swings, {without} without"
-    );
-}
-
-#[test]
 fn a_dwell_whose_reading_does_not_follow_its_reference_is_not_still() {
     let prepared = recorded(swing, none, 0.7, 1);
     let swings = &prepared.dwells.list[6..];

@@ -54,40 +54,6 @@ fn parse(text: &str) -> Result<Calibration, String> {
     Calibration::parse(text, "cal.toml").map_err(|e| e.to_string())
 }
 
-#[test]
-fn curves_are_read_and_written_again_without_a_loss() {
-    let read = parse(&text()).unwrap();
-    let written = read.to_toml();
-    let again = parse(&written).unwrap();
-    assert_eq!(again.to_toml(), written);
-    assert_eq!(read.temperature, again.temperature);
-    let temperature = read.temperature.as_ref().unwrap();
-    assert_eq!(temperature.range_c, [-8.0, 58.5]);
-    assert_eq!(temperature.nodes[2].temp_c, 31.0);
-    let [numbers, slopes] = triad(31.0);
-    let gyro = temperature.nodes[2].gyro.as_ref().unwrap();
-    assert_eq!(gyro.C.as_flattened(), &numbers[..9]);
-    assert_eq!(gyro.slope_o[..], slopes[9..]);
-    // In the layout that the documentation shows.
-    assert!(written.contains("\n[[temperature.node]]\n"), "{written}");
-    assert!(written.contains("\n[temperature.node.gyro]\n"), "{written}");
-    assert!(read.limits() == Some([-8.0, 58.5]));
-}
-
-#[test]
-fn a_calibration_without_curves_is_written_as_before() {
-    let read = parse(PLAIN).unwrap();
-    assert!(read.temperature.is_none() && read.curves().is_none());
-    let written = read.to_toml();
-    assert!(written.contains("format = \"mimu-calibration/1\""));
-    assert!(!written.contains("temperature"), "{written}");
-    for die_c in [-40.0, 25.0, 99.0] {
-        for sensor in Sensor::BOTH {
-            assert_eq!(read.inverse_at(sensor, die_c), read.inverse(sensor));
-        }
-    }
-}
-
 /// Value of a Hermite polynomial between nodes, and of its tangents outside.
 fn expected(of: impl Fn(f64) -> [f64; 2], t: f64) -> f64 {
     let (first, last) = (NODES[0], NODES[3]);

@@ -194,22 +194,6 @@ fn a_walk_without_a_rest_has_no_dwell() {
 }
 
 #[test]
-fn rests_before_a_channel_becomes_quiet_are_found() {
-    let samples = Log::new(5).session(30);
-    let all = used(&by_hand(&samples).unwrap());
-    assert_eq!(all, 30);
-    let mut quiet = samples.clone();
-    let half = samples.t_s.len() / 2;
-    // Its wire comes off, and what is left is the noise of the converter.
-    for u in &mut quiet.raw[4][half..] {
-        *u = (*u * 1e-6 + 3.0).round() + f64::from(*u as i32 % 2);
-    }
-    let found = by_hand(&quiet).unwrap().dwells.list;
-    let before = found.iter().filter(|d| (d.first_row as usize) < half);
-    assert!(before.count() >= 14, "{}", found.len());
-}
-
-#[test]
 fn the_row_in_which_the_accelerometers_range_changes_is_named_and_neither_part_is_fitted_as_the_whole()
  {
     for (seed, factor) in [(6, 2.0), (7, 0.5), (8, 4.0)] {
@@ -238,39 +222,6 @@ fn the_row_in_which_the_accelerometers_range_changes_is_named_and_neither_part_i
         assert_eq!(part.dwells.fault, None);
         assert!(fit(part, Options::default()).is_ok());
     }
-}
-
-#[test]
-fn the_row_in_which_columns_change_places_is_named_and_the_part_before_it_is_a_session() {
-    let samples = Log::new(9).session(36);
-    // In the order of the file: accelerometer, gyro. Two bytes are lost, so each column holds its neighbour from there on.
-    let order = [3, 4, 5, 0, 1, 2];
-    let row = 7310;
-    let mut shifted = samples.clone();
-    for (k, c) in order.into_iter().enumerate() {
-        let from = &samples.raw[order[(k + 1) % 6]];
-        shifted.raw[c][row..].copy_from_slice(&from[row..]);
-    }
-    let prepared = by_hand(&shifted).unwrap();
-    let fault = prepared.dwells.fault.expect("a fault");
-    assert_eq!(
-        (fault.rows.first, fault.fault),
-        (
-            Some(row as u64 + 1),
-            Fault::ColumnsMoved {
-                now: "accel_z",
-                before: "gyro_x"
-            }
-        )
-    );
-    let before = prepared.dwells.list.iter();
-    let before = before.filter(|d| (d.first_row as usize) < row).count();
-    let problems = RecordingProblem::without_fit(&prepared);
-    assert!(problems.iter().any(|p| p.id() == "columns_moved"));
-    assert!(fit(prepared, Options::default()).is_err());
-    let part = by_hand(&first_rows(&samples, row)).unwrap();
-    assert_eq!(used(&part), before);
-    assert!(fit(part, Options::default()).is_ok());
 }
 
 #[test]
@@ -339,90 +290,6 @@ fn a_turning_platter_that_wobbles_has_a_dwell_in_each_orientation() {
             let ratio = found.row(k).norm() / scale.row(k).norm();
             assert!((ratio - 1.0).abs() < 1e-3, "{seed}, axis {k}: {ratio}");
         }
-    }
-}
-
-#[test]
-fn files_of_a_sequence_hold_many_dwells_each_at_the_rate_of_the_file() {
-    let (mut samples, _) = on_a_record_player(4, 16);
-    let rows = samples.t_s.len() / 3;
-    for (row, t_s) in samples.t_s.iter_mut().enumerate() {
-        let file = row / rows;
-        *t_s += 10.0 * file as f64;
-        samples.step.push(file as i32);
-    }
-    let mut manifest = Manifest::new("u", RATE_HZ, G, RawUnit::Si, Reference::TurntableRate);
-    manifest.imported_with = vec!["--sequence".into()];
-    manifest.step_labels = ["rest", "33", "45"].map(String::from).into();
-    let rates = |rest: &str| -> Vec<TurntableRate> {
-        [rest, "33=200", "45=270"]
-            .map(|r| r.parse().unwrap())
-            .into()
-    };
-    manifest.turntable = Some(Turntable::new(&rates("rest=0"), 1e-4));
-    let prepared = Prepared::of(manifest.clone(), &samples, STILL_FACTOR).unwrap();
-    let rated = RatedDwells::of(&prepared).unwrap();
-    let names = |dwell: usize| {
-        let step = prepared.dwells.list[dwell].step;
-        prepared.manifest.step_name(step)
-    };
-    for (o, rate) in rated.turning.iter().zip(&rated.rate_of) {
-        let file = ["33/", "45/"][*rate];
-        assert!(names(o.dwell).starts_with(file), "{}", names(o.dwell));
-    }
-    assert!(
-        rated
-            .rests
-            .iter()
-            .all(|r| names(r.dwell).starts_with("rest/"))
-    );
-    for rate in 0..2 {
-        let found = rated.rate_of.iter().filter(|r| **r == rate).count();
-        assert_eq!(found, 16, "at rate {rate}");
-    }
-    // A name that is no file is still refused.
-    manifest.turntable = Some(Turntable::new(&rates("stand=0"), 1e-4));
-    let prepared = Prepared::of(manifest, &samples, STILL_FACTOR).unwrap();
-    let refused = RatedDwells::of(&prepared).expect_err("no such file");
-    assert!(refused.to_string().contains("stand"), "{refused}");
-}
-
-#[test]
-fn a_dwell_that_contradicts_the_rate_of_its_file_is_named_and_left_out() {
-    let (mut samples, scale) = on_a_record_player(4, 16);
-    let rows = samples.t_s.len() / 3;
-    // A rest of four seconds within the file of 45 rpm: it begins the recording.
-    let (end_s, rest) = (samples.t_s[3 * rows - 1], 4 * RATE_HZ as usize);
-    for row in 0..rest {
-        samples.t_s.push(end_s + (row + 1) as f64 / RATE_HZ);
-        samples.raw[..3].iter_mut().for_each(|c| c.push(c[row]));
-    }
-    for (row, t_s) in samples.t_s.iter_mut().enumerate() {
-        let file = (row / rows).min(2);
-        *t_s += 10.0 * file as f64;
-        samples.step.push(file as i32);
-    }
-    let mut manifest = Manifest::new("u", RATE_HZ, G, RawUnit::Si, Reference::TurntableRate);
-    manifest.imported_with = vec!["--sequence".into()];
-    manifest.step_labels = ["rest", "33", "45"].map(String::from).into();
-    let rates = ["rest=0", "33=200", "45=270"].map(|r| r.parse().unwrap());
-    manifest.turntable = Some(Turntable::new(&rates, 1e-4));
-    let prepared = Prepared::of(manifest, &samples, STILL_FACTOR).unwrap();
-    let fit = fit(prepared, Options::default()).unwrap();
-    let named = fit.warnings.iter().map(ToString::to_string);
-    let named: Vec<String> = named.filter(|w| w.contains("its given rate is")).collect();
-    let says = "dwell 45/17 is not used: its given rate is 270 deg/s, and its reading shows a rest";
-    assert_eq!(named, [says]);
-    let found = fit
-        .sensor(Sensor::Gyro)
-        .unwrap()
-        .estimated
-        .triad
-        .forward
-        .matrix;
-    for k in 0..3 {
-        let ratio = found.row(k).norm() / scale.row(k).norm();
-        assert!((ratio - 1.0).abs() < 1e-3, "axis {k}: {ratio}");
     }
 }
 

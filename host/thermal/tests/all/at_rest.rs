@@ -1,7 +1,6 @@
 //! Recordings at rest without a table: biases of the gyro, and the information that one pose gives about the accelerometer.
 
 use mimu::calibration::thermal_biases::ThermalBiases;
-use mimu::judgement::JudgementKind;
 use mimu::quantity::Sensor;
 use mimu::{Manifest, RawUnit, Reference, Samples};
 use mimu_thermal::fit::{FitVerdict, Options, ThermalFit, fit};
@@ -46,34 +45,6 @@ pub fn in_poses(experiment: &Experiment, seed: u64, up: &[Vector3<f64>]) -> (Man
     }
     let manifest = Manifest::new("mti-g", RATE_HZ, GRAVITY, RawUnit::Volt, Reference::Gravity);
     (manifest, out)
-}
-
-#[test]
-fn the_judgement_of_counts_is_in_counts_and_names_axis_and_temperature() {
-    // Counts of a tenth of a millivolt; those of x jump at 30 °C by ever more of them.
-    let judged = |jump: f64| {
-        let (mut manifest, mut samples) = at_rest(&Experiment::ramp(60.0, true), 5);
-        manifest.raw_unit = RawUnit::Count;
-        samples.raw.iter_mut().flatten().for_each(|v| *v *= 1e4);
-        for (x, temp_c) in samples.raw[0].iter_mut().zip(&samples.temp_c) {
-            *x -= if *temp_c < 30.0 { jump } else { 0.0 };
-        }
-        let found = fit(vec![session((manifest, samples)).unwrap()], &[], JOINT).unwrap();
-        found.judgement()
-    };
-    let all = [0.5, 1.0, 2.0, 4.0, 8.0, 50.0].map(judged);
-    let unexplained = all.iter().filter(|j| j.kind == JudgementKind::Unexplained);
-    let unexplained: Vec<_> = unexplained.collect();
-    assert!(!unexplained.is_empty(), "{all:?}");
-    assert!(
-        unexplained.iter().all(|j| j.reason.contains(" count, ")),
-        "{all:?}"
-    );
-    for judgement in all.iter().filter(|j| j.kind >= JudgementKind::Unexplained) {
-        let (_, place) = judgement.reason.split_once("most on x, at ").unwrap();
-        let temp_c: f64 = place.split(' ').next().unwrap().parse().unwrap();
-        assert!((temp_c - 30.0).abs() < 6.0, "{judgement}");
-    }
 }
 
 #[test]
@@ -158,21 +129,6 @@ fn a_file_keeps_the_biases(found: &ThermalFit) {
             }
         }
     }
-}
-
-#[test]
-fn a_cold_start_goes_one_way() {
-    let cold = Experiment {
-        corners: vec![(0.0, -10.0), (1800.0, 40.0)],
-        ..Experiment::ramp(60.0, false)
-    };
-    let found = fit(vec![session(at_rest(&cold, 4)).unwrap()], &[], JOINT).unwrap();
-    let result = ThermalResult::of(&found);
-    assert_eq!(result.verdict, FitVerdict::OneWay);
-    says(
-        &result.sensors.gyro.unwrap().lag_reason.unwrap(),
-        &["one way"],
-    );
 }
 
 /// A unit that warms up by 15 K, with a bias of the accelerometer's z that bends by `bend` m/s² between the ends and the middle.

@@ -8,7 +8,7 @@ use mimu_thermal::base;
 use mimu_thermal::fit::{ThermalFit, fit};
 use nalgebra::Vector3;
 
-use crate::at_rest::{JOINT, at_rest, in_poses};
+use crate::at_rest::{JOINT, at_rest};
 use crate::says;
 use crate::session;
 use crate::simulation::{Experiment, GRAVITY, truth};
@@ -80,27 +80,6 @@ fn a_rest_ramp_gives_a_calibration_over_temperature_that_is_as_good_as_its_inter
             }
         }
     }
-}
-
-#[test]
-fn a_unit_that_is_moved_half_way_gives_the_same_curves() {
-    let base = at_one_temperature(25.0);
-    let moved = in_poses(
-        &Experiment::ramp(60.0, true),
-        3,
-        &[Vector3::z(), Vector3::x(), Vector3::z()],
-    );
-    let moved = session(moved).unwrap();
-    let moves = moved.moved_s.each_ref().map(Vec::len);
-    assert_eq!(moves, [2, 2], "{:?}", moved.moved_s);
-    assert!(moved.warnings.iter().any(|w| {
-        w.to_string()
-            .starts_with("the unit was moved 2 times, first at 1600 s")
-    }));
-    let found = fit(vec![moved], &[], JOINT).unwrap();
-    let curves = base::calibration(&found, &base, CREATED).unwrap();
-    let [with, without] = [&curves, &base].map(|c| rms(&errors(c, Sensor::Gyro)));
-    assert!(with < 0.15 * without, "{with}, {without}");
 }
 
 #[test]

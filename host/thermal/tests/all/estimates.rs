@@ -163,18 +163,3 @@ fn the_noise_at_rest_widens_the_intervals_of_the_biases_by_what_it_says_and_noth
         }
     }
 }
-
-#[test]
-fn a_derivative_is_that_of_the_curve() {
-    let joint = estimate(
-        &[session(Experiment::ramp(60.0, true).record(8)).unwrap()],
-        Choice::JOINT,
-    )
-    .unwrap();
-    let curves = joint.curves.gyro.as_ref().unwrap();
-    let [[below, _], [_, slope], [above, _]] = [19.99, 20.0, 20.01].map(|t| curves.forward(t));
-    let numeric = (above.matrix - below.matrix) / 0.02;
-    assert!((numeric - slope.matrix).norm() < 1e-6 * slope.matrix.norm().max(1e-9) + 1e-10);
-    let numeric = (above.bias - below.bias) / 0.02;
-    assert!((numeric - slope.bias).norm() < 1e-4 * slope.bias.norm());
-}

@@ -1,7 +1,6 @@
 //! The whole path of `mimu thermal fit`: verdicts, held-out errors, and the calibration file.
 
 use mimu::calibration::Calibration;
-use mimu::calibration::comparison::compare;
 use mimu::quantity::Sensor;
 use mimu_thermal::fit::{FitVerdict, Options, ThermalFit, fit};
 use mimu_thermal::judge::rms;
@@ -74,31 +73,6 @@ fn a_whole_cycle_is_fitted_and_its_file_compensates_the_unit_at_all_temperatures
         assert!(gyro < 4e-4, "{temp_c}: {gyro}");
         let accel = error_at(&file, Sensor::Accel, temp_c, &Vector3::new(5.0, -5.0, 5.0));
         assert!(accel < 1.5e-3, "{temp_c}: {accel}");
-    }
-}
-
-#[test]
-fn the_files_pieces_between_nodes_are_the_curves() {
-    let whole = fitted(&Experiment::ramp(60.0, true), 12, JOINT);
-    let file = whole.calibration("2026-01-01T00:00:00Z").unwrap();
-    for sensor in Sensor::BOTH {
-        let curves = whole.joint.curves[sensor].as_ref().unwrap();
-        for k in 0..40 {
-            let temp_c = -8.0 + 1.9 * f64::from(k);
-            let triad = curves.triad(temp_c).unwrap();
-            let pieces = file.inverse_at(sensor, temp_c).unwrap();
-            let estimates = triad.inverse_estimates();
-            for (i, e) in estimates.iter().enumerate() {
-                let piece = match i {
-                    0..9 => pieces.matrix[(i / 3, i % 3)],
-                    _ => pieces.offset[i - 9],
-                };
-                assert!(
-                    (piece - e.value).abs() < 0.1 * e.sigma,
-                    "{sensor} {i} {temp_c}"
-                );
-            }
-        }
     }
 }
 
@@ -191,36 +165,4 @@ fn a_soak_finds_all_parameters_and_as_printed_only_scale_factors_and_biases() {
         "{:?}",
         joint.joint.lag(Sensor::Gyro)
     );
-}
-
-#[test]
-fn a_calibration_differs_from_itself_in_nothing_and_from_another_run_by_its_sigmas_at_both_ends() {
-    let [a, b] = [18, 19].map(|seed| {
-        let found = fitted(&Experiment::ramp(60.0, true), seed, JOINT);
-        let made = found.calibration("2026-01-01T00:00:00Z").unwrap();
-        (seed.to_string(), made)
-    });
-    let same = compare(&[a.clone(), a.clone()]).unwrap();
-    assert!(same.parameters.iter().all(|p| p.spread == 0.0));
-    let differences = compare(&[a, b]).unwrap().parameters;
-    let at_ends = differences.iter().filter(|p| p.name.ends_with("°C"));
-    let sigmas: Vec<f64> = at_ends
-        .map(|p| {
-            let (difference, half) = p.difference().unwrap();
-            1.96 * difference / half.unwrap()
-        })
-        .collect();
-    let mean = (sigmas.iter().map(|s| s * s).sum::<f64>() / sigmas.len() as f64).sqrt();
-    assert!(sigmas.len() == 24 && (0.5..1.6).contains(&mean), "{mean}");
-}
-
-#[test]
-fn a_range_that_was_not_covered_is_refused() {
-    let sessions = vec![session(Experiment::ramp(60.0, true).record(20)).unwrap()];
-    let options = Options {
-        range_c: Some([-40.0, 85.0]),
-        ..JOINT
-    };
-    let said = fit(sessions, &[], options).unwrap_err().to_string();
-    assert!(said.contains("are to cover -40 to 85 °C"), "{said}");
 }

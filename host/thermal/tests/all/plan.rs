@@ -55,46 +55,6 @@ fn a_soak_at_four_set_points_knows_at_each_what_its_own_dwells_give_and_between_
 }
 
 #[test]
-fn a_long_rest_ramp_knows_a_line_as_a_regression_over_time_does_and_no_scale_factor() {
-    let mut asked = request(Procedure::RestRamp);
-    asked.shape = Shape::Line;
-    asked.soak_s = 0.0;
-    let found = plan(&asked).unwrap();
-    // Half an hour from 0 to 60 °C: the variance of a line is 1/n in the middle of its points and 4/n at their ends.
-    let mean = WHITE.map(|n| n / 1800f64.sqrt());
-    for (k, sensor) in found.sensors.iter().enumerate() {
-        near(sensor.at[1].bias.unwrap(), mean[k], 1e-3);
-        near(sensor.at[0].bias.unwrap(), 2.0 * mean[k], 1e-2);
-        near(sensor.at[2].bias.unwrap(), 2.0 * mean[k], 1e-2);
-        assert!(
-            sensor
-                .at
-                .iter()
-                .all(|at| at.scale.is_none() && at.cross.is_none())
-        );
-    }
-    let said = found.inseparable.join("\n");
-    assert!(said.contains("scale factor") && said.contains("warm-up") && said.contains("lag"));
-}
-
-#[test]
-fn a_bias_that_wanders_is_known_no_better_than_it_wanders() {
-    let wandering = |b: f64| {
-        let mut asked = request(Procedure::Ramp);
-        asked.noise = WHITE.map(|n| DwellNoise { n, b, k: 0.0 });
-        plan(&asked).unwrap().sensors[0].at[1]
-    };
-    let [steady, wanders] = [0.0, 1e-3].map(wandering);
-    // Flicker noise over three decades has the variance B² ln 1000 / π, 2.2 B². Five hours average out what is faster than an hour. The
-    // slower wander limits the four coefficients: at least a third of the variance, and less than all.
-    let share = (wanders.bias.unwrap() / 1e-3).powi(2) / (1000f64.ln() / std::f64::consts::PI);
-    assert!((0.33..1.0).contains(&share), "{share}");
-    assert!(wanders.bias > steady.bias.map(|s| 10.0 * s));
-    // Turns both ways within minutes contain little of it.
-    assert!(wanders.scale.unwrap() < 0.2 * wanders.bias.unwrap() / 50f64.to_radians());
-}
-
-#[test]
 fn every_procedure_with_motion_determines_everything_and_longer_dwells_more() {
     for procedure in [Procedure::Soak, Procedure::Niu, Procedure::Ramp] {
         let with = |kelvin_per_min: f64| -> Planned {
@@ -225,21 +185,4 @@ fn a_soak_both_ways_meets_each_set_point_after_heating_and_after_cooling() {
             1e-6,
         );
     }
-}
-
-#[test]
-fn a_course_that_does_not_fit_the_procedure_or_the_range_is_refused() {
-    let refused = |procedure, change: &dyn Fn(&mut Request)| {
-        let mut asked = request(procedure);
-        change(&mut asked);
-        plan(&asked).unwrap_err().to_string()
-    };
-    let course = |r: &mut Request| r.course = vec![[0.0, 0.0], [60.0, 0.0]];
-    assert!(refused(Procedure::Soak, &course).contains("soak has its own"));
-    assert!(refused(Procedure::RestRamp, &course).contains("rest-ramp has its own"));
-    let beyond = |r: &mut Request| r.course = vec![[0.0, 0.0], [61.0, 0.0]];
-    assert!(refused(Procedure::Ramp, &beyond).contains("61 °C is outside"));
-    let one = |r: &mut Request| r.course = vec![[0.0, 0.0]];
-    assert!(refused(Procedure::Niu, &one).contains("no ramp"));
-    assert!(refused(Procedure::Ramp, &|r| r.both_ways = true).contains("no set points"));
 }

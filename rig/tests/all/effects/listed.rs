@@ -201,38 +201,6 @@ fn thermal_errors_follow_the_temperature_of_the_dies() {
 }
 
 #[test]
-fn a_thermal_lag_opens_a_loop_as_wide_as_the_ramp_and_closes_at_rest() {
-    let ramp = 0.05;
-    for (id, key, unit) in [
-        ("gyro_thermal_lag", "dps_per_c", DPS),
-        ("accel_thermal_lag", "mg_per_c", MG),
-    ] {
-        for sign in [1.0, -1.0] {
-            let effect = format!("id = \"{id}\"\n{key} = [1, 2, 3]\nlag_s = 30");
-            let (mut pair, dt) = (Pair::new(&effect, 0.1), 0.1);
-            let mut error = [0.0; 3];
-            for n in 0..6000 {
-                let (gyro, accel) = pair.step(
-                    &motion(0.0, [0.0; 3], [0.0; 3]),
-                    25.0 + sign * ramp * dt * f64::from(n),
-                );
-                error = if id.starts_with("gyro") { gyro } else { accel };
-                if n == 0 {
-                    close(error, [0.0; 3], 0.0, "at rest");
-                }
-            }
-            // 600 s are 20 lags.
-            close(
-                error,
-                [1.0, 2.0, 3.0].map(|c| -sign * c * unit * ramp * 30.0),
-                1e-6 * unit,
-                id,
-            );
-        }
-    }
-}
-
-#[test]
 fn a_mismatched_bit_adds_its_error_wherever_it_is_set() {
     let rig = "format = \"mimu-rig/1\"\n[unit.gyro_axes]\nwhite_si = [0, 0, 0]\ninstability_si = [0, 0, 0]\n\
                walk_si = [0, 0, 0]\nbandwidth_hz = [inf, inf, inf]\n[converter]\nreference_error_ppm = 0\n";
@@ -282,25 +250,6 @@ fn where_codes_are_missing_all_above_are_too_high() {
     }
 }
 
-#[test]
-fn each_converter_has_errors_and_codes_of_its_own() {
-    let errors = "[8, 0, 0, 0, 0, 0, 0, 4, 0, 0, 0, 0, 0, 0, 2, 0, 0, 0]";
-    let effect = format!(
-        "id = \"gyro_converters\"\nbit_errors_lsb = {errors}\nadded_codes = [1000, 2000, 65536]"
-    );
-    // 32767 + 1000 has the top bit set, 32767 + 2000 not the second, and 32767 the second and third.
-    for (code, expected) in [
-        (32_767.0, [8.0, 0.0, 2.0]),
-        (31_000.0, [0.0, 0.0, 2.0]),
-        (30_000.0, [0.0, 4.0, 2.0]),
-    ] {
-        let found = by_code(&effect, code);
-        for (found, expected) in found.iter().zip(expected) {
-            assert!((found - expected).abs() < 1e-6, "{code}: {found}");
-        }
-    }
-}
-
 /// A firmware's reading of a 16-bit code whose low byte it takes for a signed number.
 fn misread(code: i16) -> f64 {
     let [high, low] = code.to_be_bytes().map(|b| f64::from(b as i8));
@@ -320,20 +269,5 @@ fn a_signed_low_byte_makes_what_such_a_firmware_makes_of_its_two_bytes() {
         assert_eq!(without.gyro_v[0].round(), f64::from(code));
         assert_eq!(with.gyro_v[0].round(), misread(code as i16), "{code}");
         assert_eq!(with.accel_v, without.accel_v);
-    }
-}
-
-#[test]
-fn the_low_byte_of_a_converter_behind_a_divider_is_misread_the_same_way() {
-    let effect = "id = \"gyro_sign_extension\"\ncodes = 256";
-    for (code, expected) in [
-        (32_767.0, -256.0),
-        (32_768.0, 0.0),
-        (32_895.0, 0.0),
-        (32_896.0, -256.0),
-    ] {
-        for found in by_code(effect, code) {
-            assert!((found - expected).abs() < 1e-6, "{code}: {found}");
-        }
     }
 }

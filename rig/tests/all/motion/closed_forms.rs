@@ -74,35 +74,3 @@ fn a_pendulum_feels_gravity_and_its_swing_along_the_rod_and_nothing_across() {
         }
     }
 }
-
-#[test]
-fn a_turn_about_any_axis_is_that_about_the_own_axis() {
-    let angle = Jet {
-        value: 0.7,
-        rate: -1.3,
-        acceleration: 2.1,
-    };
-    let before = Frame::ground(&Place::new(45.0, None)).about([0.6, 0.0, 0.8], angle);
-    for (general, own) in [
-        (
-            before.about([1.0, 0.0, 0.0], angle),
-            before.about_own::<0>(angle),
-        ),
-        (
-            before.about([0.0, 1.0, 0.0], angle),
-            before.about_own::<1>(angle),
-        ),
-        (
-            before.about([0.0, 0.0, 1.0], angle),
-            before.about_own::<2>(angle),
-        ),
-    ] {
-        assert_near(general.rate, own.rate, 1e-15);
-        assert_near(
-            general.angular_acceleration,
-            own.angular_acceleration,
-            1e-15,
-        );
-        assert!((general.attitude.inverse() * own.attitude).axis_angle().1 < 1e-15);
-    }
-}

@@ -2,12 +2,12 @@
 
 use mimu_rig::command::{Command, Commanded};
 use mimu_rig::hands::{Hands, HandsTruth};
-use mimu_rig::motion::{Carrier, Motion};
-use mimu_rig::plan::{Plan, TableAxis, Turn};
-use mimu_rig::rotation::{Vector, dot, norm, scale};
+use mimu_rig::motion::Motion;
+use mimu_rig::plan::Plan;
+use mimu_rig::rotation::{Vector, norm, scale};
 use mimu_rig::table::{Table, TableTruth};
 
-use super::table::{plan, table};
+use super::table::plan;
 use super::{assert_near, minus};
 
 const H: f64 = 1e-3;
@@ -96,88 +96,6 @@ impl<'a> Course<'a> {
             );
         }
     }
-}
-
-#[test]
-fn a_table_goes_where_it_is_told_and_stands_there_within_its_own_errors() {
-    // Mounting is 39 arcseconds, the rest below 20.
-    for (truth, off) in [
-        (TableTruth::ideal(), 1e-12),
-        (TableTruth::default(), 60.0 * ARCSEC),
-    ] {
-        let mut table = Table::commanded(&at_rest(), &truth).unwrap();
-        let mut course = Course::new(&mut table);
-        course.run(2.0);
-        for up in [[1.0, 0.0, 0.0], [0.0, -3.0, 0.0], [0.3, 0.5, -0.2]] {
-            course.tell(go(up));
-            assert!(course.wait() > 1.0);
-            let motion = course.run(1.0);
-            assert_near(motion.force, scale(G / norm(up), up), G * off + 1e-9);
-            let position = course.carrier.position(course.t_s());
-            assert_near(position.up, scale(1.0 / norm(up), up), 1e-12);
-            assert!(position.heading.unwrap().abs() < 1e-12);
-        }
-    }
-}
-
-#[test]
-fn a_turn_by_an_angle_is_that_of_a_plan_and_begins_at_rest() {
-    let truth = TableTruth::default();
-    let steps = "lead_in_s = 1\n[[step]]\nup = [0, 0, 1]\ndwell_s = 1\n[[step]]\nturn_axis = \"middle\"\nturn_deg = 90\nturn_dps = 30";
-    let mut planned = table(steps, &truth);
-    let mut told = Table::commanded(&plan(steps), &truth).unwrap();
-    let mut course = Course::new(&mut told);
-    course.run(2.0);
-    let turn = Turn {
-        axis: TableAxis::Middle,
-        angle: 90f64.to_radians(),
-        rate: 30f64.to_radians(),
-    };
-    course.tell(Command::Turn(turn));
-    for _ in 0..3000 {
-        let motion = course.step();
-        let other = planned.at(motion.t_s).motion;
-        assert_near(motion.rate, other.rate, 1e-9);
-    }
-    course.wait();
-    assert_near(
-        course.carrier.position(course.t_s()).up,
-        [0.0, 1.0, 0.0],
-        1e-12,
-    );
-    course.tell(Command::Rate(0.5));
-    let t_s = course.t_s();
-    let refused = course.carrier.command(t_s, Command::Turn(turn));
-    assert!(refused.unwrap_err().contains("starts from rest"));
-}
-
-#[test]
-fn a_move_takes_as_long_and_ends_in_the_same_attitude_as_between_two_steps_of_a_plan() {
-    let truth = TableTruth::default();
-    let steps = "lead_in_s = 1\n[[step]]\nup = [0, 0, 1]\ndwell_s = 1\n[[step]]\nup = [0.3, 0.4, -0.2]\nheading_deg = 30\ndwell_s = 1";
-    let mut planned = table(steps, &truth);
-    let mut told = Table::commanded(&plan(steps), &truth).unwrap();
-    let up = scale(1.0 / 0.29_f64.sqrt(), [0.3, 0.4, -0.2]);
-    let mut course = Course::new(&mut told);
-    course.run(2.0);
-    course.tell(Command::Move {
-        up,
-        heading: Some(30f64.to_radians()),
-    });
-    // Both leave the first pose at 2 s, and the load swings equally.
-    for _ in 0..4000 {
-        let motion = course.step();
-        let other = planned.at(motion.t_s).motion;
-        let angle = (motion.attitude.inverse() * other.attitude).axis_angle().1;
-        assert!(angle < 1e-12, "{angle} at {} s", motion.t_s);
-        assert_near(motion.rate, other.rate, 1e-9);
-        let dwells = planned.at(motion.t_s).step == Some(1);
-        if dwells || course.carrier.busy(motion.t_s) {
-            assert_eq!(dwells, !course.carrier.busy(motion.t_s));
-        }
-    }
-    let position = course.carrier.position(course.t_s());
-    assert!((position.heading.unwrap() - 30f64.to_radians()).abs() < 1e-12);
 }
 
 #[test]
@@ -308,61 +226,6 @@ const FACES: [Vector; 6] = [
 ];
 
 #[test]
-fn a_person_who_is_told_begins_like_one_with_a_plan_and_misses_every_pose_by_as_much() {
-    let truth = HandsTruth {
-        jolt_probability: 0.0,
-        ..HandsTruth::default()
-    };
-    let mut planned = Hands::new(&at_rest(), &truth, 3).unwrap();
-    let mut told = hand(&truth, 3);
-    assert_eq!(told.at(0.5).motion, planned.at(0.5).motion);
-    let mut misses = 0.0;
-    let n = 60;
-    let mut course = Course::new(&mut told);
-    for up in FACES.iter().cycle().take(n) {
-        course.tell(go(*up));
-        // A pause, a turn, a pause.
-        let took = course.wait();
-        assert!((1.0..8.0).contains(&took), "{took}");
-        let rest = course.run(0.5);
-        assert!(norm(rest.rate) < 1e-4, "it lies still");
-        let cosine = dot(rest.force, *up) / norm(rest.force);
-        misses += cosine.clamp(-1.0, 1.0).acos().powi(2);
-    }
-    // 3 degrees about each of two level axes; 120 squares determine this to 13 %.
-    let rms = (misses / n as f64 / 2.0).sqrt().to_degrees();
-    assert!((2.2..3.8).contains(&rms), "{rms}");
-}
-
-#[test]
-fn no_command_makes_a_hand_jump_whenever_it_comes() {
-    let truth = HandsTruth {
-        // Long and large knocks, so that some commands coincide with one.
-        jolt_probability: 1.0,
-        jolt_s: 1.0,
-        jolt_mrad: 30.0,
-        ..HandsTruth::default()
-    };
-    for seed in 0..4 {
-        let mut told = hand(&truth, seed);
-        let mut course = Course::new(&mut told);
-        course.tell(Command::Fidget(1));
-        for (k, up) in FACES.iter().cycle().take(40).enumerate() {
-            course.tell(go(*up));
-            if k % 5 == 0 {
-                course.tell(Command::Hold(k % 2 == 0));
-            }
-            course.run(0.1 + 0.173 * ((k * k) % 37) as f64);
-            if k % 7 == 0 {
-                course.tell(Command::Stop);
-            }
-        }
-        // A turn of 180 degrees within a second has 18 rad/s², and its detour as much.
-        course.is_continuous(60.0);
-    }
-}
-
-#[test]
 fn a_hand_that_moves_in_every_third_pose_does_so_after_it_has_come_to_rest_and_in_no_other() {
     let truth = HandsTruth {
         jolt_probability: 0.0,
@@ -385,19 +248,4 @@ fn a_hand_that_moves_in_every_third_pose_does_so_after_it_has_come_to_rest_and_i
         let wanted = if k % 3 == 2 { 2.9..8.1 } else { -1.0..1e-6 };
         assert!(wanted.contains(turned), "pose {k}: {turned} degrees");
     }
-}
-
-#[test]
-fn a_person_who_is_told_to_hold_on_never_rests_and_lies_still_again_when_told_to_let_go() {
-    let mut told = hand(&HandsTruth::default(), 7);
-    let mut course = Course::new(&mut told);
-    for (held, up) in [(true, FACES[0]), (false, FACES[1])] {
-        course.tell(Command::Hold(held));
-        course.tell(go(up));
-        course.wait();
-        let motion = course.run(0.2);
-        assert_eq!(norm(motion.rate) > 1e-3, held, "{:?}", motion.rate);
-    }
-    let refusal = told.command(100.0, Command::Rate(1.0)).unwrap_err();
-    assert!(refusal.contains("constant rate"), "{refusal}");
 }

@@ -65,56 +65,6 @@ fn a_turn_is_numbered_from_rest_to_rest_and_its_rate_adds_up_to_its_angle() {
     }
 }
 
-#[test]
-fn a_dwell_after_a_turn_begins_when_the_load_has_come_to_rest_where_the_turn_ended() {
-    let truth = TableTruth {
-        settle_s: 1.5,
-        ..TableTruth::ideal()
-    };
-    let mut table = table(&quarter("middle", 90.0), &truth);
-    // 1 s, 9.05 s, 1.5 s, 2 s.
-    assert!((table.duration_s() - 13.55).abs() < 1e-9);
-    assert_eq!(table.at(0.5).step, Some(0));
-    assert_eq!(table.at(5.0).step, Some(1));
-    assert_eq!(table.at(11.0).step, None);
-    let dwell = table.at(12.5);
-    assert_eq!(dwell.step, Some(2));
-    assert_near(dwell.motion.force, [0.0, 9.793, 0.0], 1e-12);
-    assert_near(dwell.stated_force.unwrap(), [0.0, 9.793, 0.0], 1e-12);
-    assert_eq!(dwell.stated_rate, Some([0.0; 3]));
-}
-
-#[test]
-fn rounds_repeat_all_steps_and_begin_when_they_are_due() {
-    let text = format!(
-        "rounds = 3\nround_s = 20\n{}",
-        quarter("inner", 360.0 / 8.0)
-    );
-    let mut table = table(&text, &TableTruth::ideal());
-    let started: Vec<f64> = (0..6000)
-        .map(|k| f64::from(k) * 0.01)
-        .filter(|t| {
-            let step = table.at(*t).step;
-            step.is_some_and(|s| s % 3 == 1)
-        })
-        .collect();
-    // The first time of each turn.
-    let firsts: Vec<f64> = started
-        .iter()
-        .enumerate()
-        .filter(|(i, t)| *i == 0 || **t - started[i - 1] > 0.1)
-        .map(|(_, t)| *t)
-        .collect();
-    assert_eq!(firsts.len(), 3);
-    assert!((firsts[0] - 1.0).abs() < 0.011);
-    // Back by 45 degrees at 60 deg/s with 200 deg/s² takes 1.05 s, then 1 s to settle and 1 s of dwell.
-    for (round, first) in firsts.iter().enumerate().skip(1) {
-        let due = 20.0 * round as f64 + 1.05 + 1.0 + 1.0;
-        assert!((first - due).abs() < 0.011, "{first} {due}");
-    }
-    assert_eq!(plan(&text).dwells(), 9);
-}
-
 /// niu's cycle, 3.2 and appendix A: its poses, both directions about each axis, and its duration of 152 s.
 #[test]
 fn niu_s_eight_steps_reach_five_poses_and_turn_both_ways_about_each_axis() {

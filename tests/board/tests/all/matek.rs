@@ -7,7 +7,7 @@ use mimu_board::inertial::{Feed, Sensed};
 use mimu_board::running::Board;
 use mimu_board_tests::conversation::{Answer, Conversation, Sample};
 use mimu_board_tests::{MS, digital_image};
-use mimu_core::wire::{Request, Verdict, flags};
+use mimu_core::wire::{Request, Verdict};
 
 /// The clock on the z axis, g/s, and its first value, g.
 const CLOCK: [f64; 2] = [4.0, -15.5];
@@ -163,79 +163,6 @@ fn every_sample_is_what_the_sensor_sensed_when_the_device_says_that_it_was_taken
         assert!((f64::from(temps_c[0]) - die_c).abs() < 0.35, "{temps_c:?}");
         assert_eq!((head.temp_c, head.flags), (temps_c[0], 0));
     }
-}
-
-/// Output register of port C, and the pin of the sensor's chip select, low in a transfer.
-const GPIOC_ODR: u64 = 0x5802_0814;
-const SELECT: u64 = 1 << 15;
-
-#[test]
-fn samples_that_a_starved_reader_loses_are_counted_and_no_others() {
-    for (starved_ms, crystal) in [(60, 0.99), (95, 1.03), (140, 0.97), (300, 1.0)] {
-        let mut device = streaming(feed(), crystal);
-        device.run_for(1_500 * MS);
-        // Between two transfers: during one the emulated sensor makes no samples.
-        while device.board.register(GPIOC_ODR).unwrap() & SELECT == 0 {
-            device.run_for(MS / 100);
-        }
-        device.board.hold(true).unwrap();
-        device.run_for(starved_ms * MS);
-        device.board.hold(false).unwrap();
-        device.run_for(1_000 * MS);
-        let lost = missing(&device.samples, 1e-3 * crystal);
-        assert_eq!(device.lost, (lost, 0), "{starved_ms}");
-        // The FIFO keeps 101 packets; the poll before and the one after it add one each.
-        let expected = starved_ms as i64 - 101;
-        let off = i64::from(lost) - expected.max(0);
-        assert!((-2..=2).contains(&off), "{starved_ms} ms: {lost} lost");
-        println!("{starved_ms} ms without a reader: {lost} samples lost and counted");
-    }
-}
-
-#[test]
-fn a_rate_beyond_the_range_is_flagged_as_saturated() {
-    let over = |ns: u64| {
-        let beyond = (3_000_000_000..3_005_000_000).contains(&ns);
-        let rate = if beyond { 2_100.0 } else { 1_900.0 };
-        Sensed {
-            rate_dps: [0.0, -rate, 0.0],
-            ..sensed(ns as f64 * 1e-9)
-        }
-    };
-    let mut device = streaming(Box::new(over), 1.0);
-    device.run_for(3_500 * MS);
-    let of = |flagged: bool| {
-        let is = |r: &&Sample| (r.flags & flags::SATURATED != 0) == flagged;
-        device.samples.iter().filter(is).count()
-    };
-    // One batch or two.
-    assert!((20..=40).contains(&of(true)), "{}", of(true));
-    assert!(of(false) > 2_000);
-}
-
-#[test]
-fn after_the_supply_comes_back_the_sensor_is_set_up_again() {
-    let mut device = streaming(feed(), 1.0);
-    device.run_for(1_000 * MS);
-    device.board.cut_supply(1).unwrap();
-    device.run_for(50 * MS);
-    device.board.restore_supply().unwrap();
-    device.greeting();
-    device.samples.clear();
-    let raw = Request::Stream {
-        raw: true,
-        compensated: false,
-    };
-    assert_eq!(device.ask(raw), Answer::Done);
-    device.run_for(1_500 * MS);
-    assert!(device.samples.len() > 800, "{}", device.samples.len());
-    assert_eq!(device.lost, (0, 0));
-    assert!(
-        device
-            .samples
-            .windows(2)
-            .all(|p| p[1].number == p[0].number + 1)
-    );
 }
 
 #[test]

@@ -11,7 +11,7 @@ use mimu_core::PerSensor;
 use mimu_core::compensation::{Affine, Compensation};
 use mimu_core::stored::{self, Curves};
 use mimu_core::table::Node;
-use mimu_core::wire::{CHUNK, Call, Decoder, MAX_FRAME, Message, Refusal, Request, encode};
+use mimu_core::wire::{Call, Decoder, MAX_FRAME, Message, Refusal, Request, encode};
 use nalgebra::{Matrix3, Vector3};
 
 /// A calibration with this many temperature nodes, distinct for each `scale`.
@@ -189,12 +189,6 @@ fn a_served_board_starts_with_the_calibration_that_its_file_holds() {
     assert_eq!(stored, Some(hash));
 }
 
-/// Each start of the device takes seconds, because it polls while its converter calibrates.
-#[test]
-fn whenever_the_supply_is_cut_the_old_or_the_new_calibration_is_there_whole() {
-    cut_at_instants(Kind::Nucleo, 8);
-}
-
 #[test]
 #[ignore = "nightly: 300 starts of each board"]
 fn at_each_of_300_instants_the_old_or_the_new_calibration_is_there_whole() {
@@ -292,44 +286,7 @@ fn judge(
 }
 
 #[test]
-fn a_calibration_of_another_unit_is_refused_and_nothing_is_erased_for_the_one_in_use() {
-    let old = calibration(7, 3.5);
-    let mut device = with_old(&old);
-    // The number of the emulated part is 0, which no real unit has.
-    let origin = stored::Origin {
-        unit_id: Some(*b"another-unit"),
-        ..stored::Origin::UNKNOWN
-    };
-    let other = calibration_of(&origin, 7, 3.5);
-    device.upload(&other);
-    let unit_id = *b"another-unit";
-    let refused = Answer::Refused(Refusal::OtherUnit { unit_id });
-    assert_eq!(device.ask(Request::UploadCommit), refused);
-    assert_eq!(device.download().as_ref(), Some(&old));
-
-    // It is there already: an erase alone would take a second.
-    device.upload(&old);
-    let began = device.board.state().ns;
-    assert_eq!(device.ask(Request::UploadCommit), Answer::Done);
-    let took = device.board.state().ns - began;
-    assert!(took < 50 * MS, "{took} ns");
-
-    let insists = Request::UploadBegin {
-        length: other.len() as u32,
-        hash: stored::hash(&other),
-        other_unit: true,
-    };
-    assert_eq!(device.ask(insists), Answer::Done);
-    for (k, bytes) in other.chunks(CHUNK).enumerate() {
-        let offset = (k * CHUNK) as u32;
-        let chunk = Request::UploadChunk { offset, bytes };
-        assert_eq!(device.ask(chunk), Answer::Done);
-    }
-    assert_eq!(device.ask(Request::UploadCommit), Answer::Done);
-    assert_eq!(device.download(), Some(other));
-}
-
-#[test]
+#[ignore = "nightly: seconds of the board; by day `slots` of the firmware loses its supply at every word"]
 fn a_failing_supply_is_no_time_to_store_and_the_old_calibration_stays() {
     let (old, new) = (calibration(7, 3.5), calibration(16, 3.6));
     let mut device = with_old(&old);

@@ -213,6 +213,7 @@ fn a_panic_restarts_the_device_which_tells_the_line() {
 
 /// The guard below the stack: the fault is told, and the static memory below it is as it was.
 #[test]
+#[ignore = "nightly: another fault; by day an undefined instruction"]
 fn a_stack_that_overflows_is_a_fault_of_its_own_and_clobbers_nothing() {
     let mut board = sampling();
     let (ms, cause, greeted) = restarted(&mut board, task("process"), Fault::Push);
@@ -226,24 +227,6 @@ fn a_stack_that_overflows_is_a_fault_of_its_own_and_clobbers_nothing() {
     assert!(cfsr & 0x12 != 0, "{place}");
     // The record of the time since power-on lies at the upper end of static memory.
     assert!(greeted.powered_for_ms.is_some());
-}
-
-/// A transmitter whose interrupt never comes: samples go on and feed the watchdog.
-#[test]
-#[ignore = "nightly: another place that waits; by day the watchdog bites a task and an interrupt"]
-fn a_transmitter_that_waits_for_ever_restarts_the_device() {
-    let mut board = sampling();
-    board.send(&call(Request::Stream {
-        raw: true,
-        compensated: false,
-    }));
-    board.run_for(100 * MS).unwrap();
-    let (ms, cause, greeted) = restarted(&mut board, task("output"), Fault::Pending);
-    assert!(
-        (1000..1600).contains(&ms) && cause == "Core",
-        "{cause} after {ms} ms"
-    );
-    assert!(greeted.start.contains("main.rs"), "{}", greeted.start);
 }
 
 /// A request in whose middle the task is never woken again: samples and frames go on.
@@ -316,24 +299,6 @@ fn a_converter_that_gives_no_sample_is_bitten_by_the_watchdog() {
     assert_eq!(bites(&mut board), 1);
 }
 
-/// The emulated oscillator always starts, so the program is stopped where it sets the clocks.
-#[test]
-#[ignore = "nightly: another place that waits; by day the watchdog bites a task and an interrupt"]
-fn a_program_that_waits_for_the_clocks_for_ever_is_bitten_by_the_watchdog() {
-    let mut board = still(Volts::GROUND);
-    let clocks = image().find("rcc8__version4init").unwrap();
-    let waiting = board.inject(clocks, Fault::Hang).unwrap();
-    // The watchdog's reset value: 4096 steps of four cycles of 32 kHz, 512 ms.
-    board.run_to(511 * MS).unwrap();
-    assert_eq!(bites(&mut board), 0);
-    while bites(&mut board) == 0 {
-        board.run_for(MS / 100).unwrap();
-        assert!(board.state().ns < 520 * MS, "it does not restart");
-    }
-    board.heal(waiting).unwrap();
-    assert_eq!(greeting(&mut board).told(), ("Watchdog", 2));
-}
-
 /// As if the log itself caused the failure, or the program stopped during a log.
 #[test]
 #[ignore = "nightly: a second fault within the panic"]
@@ -358,6 +323,7 @@ fn a_panic_is_told_also_if_the_log_of_it_faults() {
 
 /// A debugger that has disconnected leaves the log in blocking mode.
 #[test]
+#[ignore = "nightly: four seconds of the board"]
 fn a_log_that_nobody_reads_does_not_stop_the_program() {
     // The up channel of SEGGER's RTT, after 24 bytes of header: name, buffer, size, written, read, flags.
     const SIZE: u64 = 24 + 8;
@@ -380,6 +346,7 @@ fn a_log_that_nobody_reads_does_not_stop_the_program() {
 }
 
 #[test]
+#[ignore = "nightly: three starts of the board; by day the command is told of a reset"]
 fn time_since_power_on_goes_on_over_resets_and_is_unknown_once_its_record_is_lost() {
     let mut board = still(Volts::GROUND);
     let first = greeting(&mut board).powered_for_ms.unwrap();

@@ -11,22 +11,6 @@ pub const STREAM: Request<'_> = Request::Stream {
 };
 
 #[test]
-fn a_device_that_is_switched_on_says_so_and_has_no_calibration() {
-    let mut device = Conversation::new(still(Volts::GROUND));
-    let Answer::Greeting { hash, start } = device.greeting() else {
-        panic!("no greeting");
-    };
-    assert_eq!((hash, start.as_str()), (None, "PowerOn"));
-    assert_eq!(device.download(), None);
-
-    device.board.reset_by_pin(1).unwrap();
-    let Answer::Greeting { start, .. } = device.greeting() else {
-        panic!("no greeting");
-    };
-    assert_eq!(start, "ResetPin");
-}
-
-#[test]
 fn no_sample_is_lost_or_out_of_order_and_all_are_1_ms_apart() {
     stream_for(5);
 }
@@ -73,31 +57,6 @@ fn stream_for(seconds: u64) {
     assert_eq!(device.board.restarts().unwrap(), []);
 }
 
-#[test]
-fn the_raw_stream_holds_the_voltages_of_the_pins() {
-    let mut volts = Volts::GROUND;
-    for (k, (_, _, input)) in WIRING.into_iter().enumerate() {
-        volts.input[input] = 0.4 + 0.2 * k as f64;
-    }
-    let reference = WIRING[9].2;
-    volts.input[reference] = 2.5 * DIVIDER_RATIO;
-    let mut device = Conversation::new(still(volts));
-    device.greeting();
-    device.run_for(STARTED);
-    assert_eq!(device.ask(STREAM), Answer::Done);
-    device.run_for(200 * MS);
-    assert!(device.samples.len() > 100);
-    for Sample { number, counts, .. } in &device.samples {
-        for (k, &sum) in counts.gyro.iter().chain(&counts.accel).enumerate() {
-            let (net, pin, input) = WIRING[k];
-            // The converter rounds down, and a sum has two conversions.
-            let code = (volts.input[input] / volts.rail * 65_535.0 + 1e-6).floor();
-            let off = f64::from(sum) - 2.0 * code;
-            assert!(off.abs() <= 2.0, "{number}: {net:?} at {pin}: {off}");
-        }
-    }
-}
-
 /// Pins of a unit at rest and 25 °C, with the converter's supply at `rail`, V.
 pub fn at_rest(rail: f64) -> Volts {
     let mut volts = Volts {
@@ -112,24 +71,4 @@ pub fn at_rest(rail: f64) -> Volts {
         };
     }
     volts
-}
-
-#[test]
-fn a_garbled_line_costs_frames_and_nothing_else() {
-    let mut device = Conversation::new(still(Volts::GROUND));
-    device.greeting();
-    device.board.garble(20_000).unwrap();
-    let mut answered = 0;
-    for _ in 0..200 {
-        let id = device.send(Request::Hello);
-        device.run_for(20 * MS);
-        answered += u32::from(device.answer(id).is_some());
-    }
-    // A call of about 9 bytes arrives intact five times out of six.
-    assert!((120..200).contains(&answered), "{answered} of 200");
-    device.board.garble(0).unwrap();
-    // The rest of a broken frame ends with the first zero of the next.
-    let id = device.send(Request::Hello);
-    device.run_for(20 * MS);
-    assert!(device.answer(id).is_some());
 }

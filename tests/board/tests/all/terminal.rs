@@ -4,30 +4,11 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use mimu_board::front::Front;
-use mimu_board::running::{Board, STORE};
 use mimu_board::schematic::Volts;
 use mimu_board::serve::{Pace, Served};
-use mimu_board_tests::{MS, STARTED, image, still};
+use mimu_board_tests::{MS, STARTED, still};
 use mimu_rig::plan::Plan;
 use mimu_rig::rig_file::{RigFile, RigTruth};
-
-#[test]
-fn what_is_in_the_file_is_in_the_flash_and_a_wrong_file_is_refused() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("unit.flash");
-    let board = || Board::new(&image(), Front::Still(Volts::GROUND)).unwrap();
-    drop(Served::new(board(), Pace::Fast, Some(&path)).unwrap());
-    let mut bytes = std::fs::read(&path).unwrap();
-    assert!(bytes.iter().all(|&byte| byte == 0xFF));
-    bytes[1234] = 0x5A;
-    std::fs::write(&path, &bytes).unwrap();
-    let mut served = Served::new(board(), Pace::Fast, Some(&path)).unwrap();
-    assert_eq!(served.board().memory(STORE + 1234, 1).unwrap(), [0x5A]);
-
-    std::fs::write(&path, b"short").unwrap();
-    let refusal = Served::new(board(), Pace::Fast, Some(&path)).unwrap_err();
-    assert!(refusal.contains("5 bytes"), "{refusal}");
-}
 
 #[test]
 fn at_the_pace_of_the_wall_a_second_takes_no_less_than_a_second() {

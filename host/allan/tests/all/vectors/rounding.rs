@@ -75,37 +75,3 @@ fn gravity_under_the_noise_of_a_long_series_costs_less_than_one_in_1e9() {
     let worst = worst(&steps);
     assert!(worst.iter().all(|&error| error < 1e-9), "{worst:?}");
 }
-
-/// Twice a first-order filter of a thousand samples. From one sample to the next its Hadamard deviation is a
-/// thirtieth of its Allan deviation.
-#[test]
-fn noise_behind_a_slow_filter_costs_no_more_and_its_hadamard_deviation_one_in_1e5() {
-    let mut random = Random(7);
-    let mut level = [0.0; 2];
-    let steps = long(|_| {
-        level[0] += 1e-3 * (random.normal() - level[0]);
-        level[1] += 1e-3 * (level[0] - level[1]);
-        level[1]
-    });
-    let [allan, modified, hadamard] = worst(&steps);
-    assert!(
-        allan < 1e-9 && modified < 1e-9,
-        "{allan:.1e} {modified:.1e}"
-    );
-    assert!(hadamard < 1e-5, "{hadamard:.1e}");
-}
-
-/// A ramp without noise: its integral is the smoothest that is not a line.
-#[test]
-fn a_ramp_costs_less_than_one_in_1e8_and_leaves_1e_4_of_it_to_the_hadamard_deviation() {
-    let steps: Vec<i64> = (0..2 * ALL_TERMS as i64).map(|i| 1024 * i).collect();
-    let [allan, modified, _] = worst(&steps);
-    assert!(
-        allan < 1e-8 && modified < 1e-8,
-        "{allan:.1e} {modified:.1e}"
-    );
-    let spacing = Spacing::Samples(vec![1]);
-    let at_one =
-        |kind| curve(&rates(&steps), 1.0, kind, &spacing, 0.95).expect("finite")[0].deviation;
-    assert!(at_one(Deviation::Hadamard) < 1e-4 * at_one(Deviation::Allan));
-}

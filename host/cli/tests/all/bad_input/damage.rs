@@ -15,14 +15,8 @@ pub type Case = (
 pub fn column_of_dwell(samples: &mut Samples, column: &str, dwells: &[usize]) {
     for &k in dwells {
         let rows = samples.dwells[k].clone();
-        stick(samples, column, rows);
+        samples.stick(column, rows);
     }
-}
-
-/// The channel keeps its first value.
-pub fn stick(samples: &mut Samples, column: &str, rows: Range<usize>) {
-    let value = samples.rows[rows.start][samples.column(column)];
-    samples.edit(column, rows, |_| value);
 }
 
 pub fn swap(samples: &mut Samples, a: &str, b: &str) {
@@ -37,18 +31,10 @@ pub fn swap_sensors(samples: &mut Samples) {
 }
 
 pub fn scale(samples: &mut Samples, prefix: &str, factor: f64) {
-    for name in samples.names.clone() {
-        if name.starts_with(prefix) {
-            let all = samples.all();
-            samples.edit(&name, all, |x| x * factor);
-        }
-    }
+    samples.edit_all(prefix, |x| x * factor);
 }
 
-pub fn keep_every(samples: &mut Samples, nth: usize, from: usize) {
-    let mut row = 0;
-    samples.rows.retain(|_| {
-        row += 1;
-        row <= from || row % nth == 0
-    });
+/// `count` rows of `rows` after the first `skip`.
+pub fn within(rows: &Range<usize>, skip: usize, count: usize) -> Range<usize> {
+    rows.start + skip..rows.start + skip + count
 }

@@ -37,46 +37,6 @@ fn an_output_that_cannot_be_written_is_refused_before_anything_appears() {
     assert_eq!(place.names(), ["file", "rec"]);
 }
 
-#[test]
-fn missing_folders_of_a_result_are_made_by_every_command() {
-    let place = Place::with(&by_hand());
-    let recording = place.text("rec");
-    let calibration = place.text("a/b/cal.toml");
-    let in_new = |path: &str| {
-        let text = place.text(path);
-        assert!(!Path::new(&text).parent().unwrap().exists(), "{path}");
-        text
-    };
-    let made = |arguments: &str, file: &String| {
-        let done = mimu(arguments.split(' '));
-        assert_eq!(done.status, Some(0), "{arguments}: {}", done.stderr);
-        assert!(Path::new(file).exists(), "{arguments}: {file}");
-    };
-    let json = in_new("c/d/fit.json");
-    in_new("a/b/cal.toml");
-    made(
-        &format!("fit {recording} -o {calibration} --json {json}"),
-        &json,
-    );
-    for (command, out) in [
-        (
-            format!("import {recording}/samples.csv --raw-unit V --reference gravity"),
-            "e/f/rec",
-        ),
-        (
-            format!("apply {recording} --calibration {calibration}"),
-            "g/h/rec",
-        ),
-        (
-            "design -n 9 --reference gravity --table hand".into(),
-            "i/j/plan.toml",
-        ),
-    ] {
-        let out = in_new(out);
-        made(&format!("{command} -o {out}"), &out);
-    }
-}
-
 #[cfg(unix)]
 #[test]
 fn a_pipe_is_written_to_and_not_replaced() {

@@ -128,8 +128,57 @@ impl Samples {
         }
     }
 
+    /// Changes the cells of all columns whose names begin so.
+    pub fn edit_all(&mut self, prefix: &str, change: impl Fn(f64) -> f64) {
+        for name in self.names.clone() {
+            if name.starts_with(prefix) {
+                self.edit(&name, self.all(), &change);
+            }
+        }
+    }
+
+    /// About as readings in SI.
+    pub fn in_si(&mut self) {
+        self.set("raw_unit", "\"SI\"");
+        self.edit_all("accel", |u| u / 1640.0);
+        self.edit_all("gyro", |u| u / 5000.0);
+    }
+
+    /// The channel keeps its first value.
+    pub fn stick(&mut self, column: &str, rows: Range<usize>) {
+        let value = self.rows[rows.start][self.column(column)];
+        self.edit(column, rows, |_| value);
+    }
+
+    /// Writes rows twice, the last of them first.
+    pub fn repeat(&mut self, rows: &[usize]) {
+        for row in rows {
+            self.rows.insert(*row, self.rows[*row].clone());
+        }
+    }
+
+    pub fn keep_every(&mut self, nth: usize, from: usize) {
+        let mut row = 0;
+        self.rows.retain(|_| {
+            row += 1;
+            row <= from || row % nth == 0
+        });
+    }
+
+    /// Vibration in a dwell.
+    pub fn shake(&mut self, column: &str, dwell: usize) {
+        let column = self.column(column);
+        for (k, row) in self.rows[self.dwells[dwell].clone()].iter_mut().enumerate() {
+            row[column] += 400.0 * (k as f64).sin();
+        }
+    }
+
     pub fn all(&self) -> Range<usize> {
         0..self.rows.len()
+    }
+
+    pub fn second_half(&self) -> Range<usize> {
+        self.rows.len() / 2..self.rows.len()
     }
 
     /// Rows between dwell `k` and the next.

@@ -8,153 +8,24 @@ use super::generator::*;
 fn what_can_be_left_out_is_named_and_the_result_is_right() {
     #[rustfmt::skip]
     let cases: &[Case] = &[
-        (
-            "a few empty cells",
-            by_hand,
-            |s| {
-                s.edit("accel_y", 50..53, |_| f64::NAN);
-                s.edit("gyro_x", 100..101, |_| f64::NAN);
-            },
-            &["3 samples of accel_y", "1 sample of gyro_x"],
-        ),
-        (
-            "an empty cell in a turn",
-            by_hand,
-            |s| {
-                let turn = s.turn(3).start + 50;
-                s.edit("gyro_x", turn..turn + 1, |_| f64::NAN);
-            },
-            &["the turn from dwell 3 to 4", "samples are missing"],
-        ),
-        (
-            "rows twice",
-            by_hand,
-            |s| {
-                s.edit("accel_y", 100..101, |_| f64::NAN);
-                for i in [900, 500, 100] {
-                    s.rows.insert(i, s.rows[i].clone());
-                }
-            },
-            &["3 rows repeat the row before"],
-        ),
+        ("a few empty cells", by_hand, |s| { s.edit("accel_y", 50..53, |_| f64::NAN); s.edit("gyro_x", 100..101, |_| f64::NAN) }, &["3 samples of accel_y", "1 sample of gyro_x"]),
+        ("an empty cell in a turn", by_hand, |s| s.edit("gyro_x", within(&s.turn(3), 50, 1), |_| f64::NAN), &["the turn from dwell 3 to 4", "samples are missing"]),
+        ("rows twice", by_hand, |s| { s.edit("accel_y", 100..101, |_| f64::NAN); s.repeat(&[900, 500, 100]) }, &["3 rows repeat the row before"]),
         ("a rate that is one per cent off", by_hand, |s| s.set("sample_rate_hz", "99.0"), &["100.000 Hz", "99 Hz", "the stamps are used"]),
-        (
-            "a gap in a dwell",
-            by_hand,
-            |s| {
-                let from = s.dwells[4].start + 100;
-                s.rows.drain(from..from + 50);
-            },
-            &["1 gap, 0.500 s", "data row 1897"],
-        ),
-        (
-            "a gap in a turn",
-            by_hand,
-            |s| {
-                let from = s.turn(4).start + 50;
-                s.rows.drain(from..from + 20);
-            },
-            &["1 gap", "the turn from dwell 4 to 5 is not used"],
-        ),
-        (
-            "a day between two halves",
-            by_hand,
-            |s| {
-                let second = s.rows.len() / 2..s.rows.len();
-                s.edit("t_s", second, |t| t + 86400.0);
-            },
-            &["86400.000 s missing"],
-        ),
+        ("a gap in a dwell", by_hand, |s| drop(s.rows.drain(within(&s.dwells[4], 100, 50))), &["1 gap, 0.500 s", "data row 1897"]),
+        ("a gap in a turn", by_hand, |s| drop(s.rows.drain(within(&s.turn(4), 50, 20))), &["1 gap", "the turn from dwell 4 to 5 is not used"]),
+        ("a day between two halves", by_hand, |s| s.edit("t_s", s.second_half(), |t| t + 86400.0), &["86400.000 s missing"]),
         ("accelerometer stuck in dwells", by_hand, |s| column_of_dwell(s, "accel_y", &[3, 4, 9]), &["3 dwells (3, 4, 9)", "accel_y stuck"]),
         ("gyro stuck on the table", on_table, |s| column_of_dwell(s, "gyro_y", &[3, 4, 9]), &["3 dwells (3, 4, 9)", "gyro_y stuck"]),
-        (
-            "gyro stuck in a third of a turn",
-            by_hand,
-            |s| {
-                let from = s.turn(3).start + 50;
-                stick(s, "gyro_y", from..from + 50);
-            },
-            &["the turn from dwell 3 to 4 is not used: gyro_y is stuck"],
-        ),
-        (
-            "gyro stuck in the second half",
-            by_hand,
-            |s| {
-                let half = s.rows.len() / 2..s.rows.len();
-                stick(s, "gyro_y", half);
-            },
-            &["10 dwells", "gyro_y stuck"],
-        ),
-        (
-            "accelerometer clipped",
-            by_hand,
-            |s| {
-                let all = s.all();
-                s.edit("accel_z", all, |u| u.min(14000.0));
-            },
-            &["accel_z: the highest value 14000", "accel_z saturated"],
-        ),
-        (
-            "half of the samples clipped",
-            on_table,
-            |s| {
-                let all = s.all();
-                s.edit("accel_z", all, |u| u.min(16302.0));
-            },
-            &["5 dwells (20, 21, 22, 23, 24)", "accel_z saturated"],
-        ),
-        (
-            "gyro clipped in fast turns",
-            by_hand,
-            |s| {
-                let all = s.all();
-                s.edit("gyro_z", all, |u| u.clamp(-6000.0, 6000.0));
-            },
-            &["gyro_z: the lowest value -6000", "gyro_z is at its rail"],
-        ),
-        (
-            "a declared rail",
-            by_hand,
-            |s| {
-                let all = s.all();
-                s.set("rails.accel", "[-32768.0, 14000.0]");
-                s.edit("accel_z", all, |u| u.min(14000.0));
-            },
-            &["accel_z saturated"],
-        ),
+        ("gyro stuck in a third of a turn", by_hand, |s| s.stick("gyro_y", within(&s.turn(3), 50, 50)), &["the turn from dwell 3 to 4 is not used: gyro_y is stuck"]),
+        ("gyro stuck in the second half", by_hand, |s| s.stick("gyro_y", s.second_half()), &["10 dwells", "gyro_y stuck"]),
+        ("accelerometer clipped", by_hand, |s| s.edit("accel_z", s.all(), |u| u.min(14000.0)), &["accel_z: the highest value 14000", "accel_z saturated"]),
+        ("half of the samples clipped", on_table, |s| s.edit("accel_z", s.all(), |u| u.min(16302.0)), &["5 dwells (20, 21, 22, 23, 24)", "accel_z saturated"]),
+        ("gyro clipped in fast turns", by_hand, |s| s.edit("gyro_z", s.all(), |u| u.clamp(-6000.0, 6000.0)), &["gyro_z: the lowest value -6000", "gyro_z is at its rail"]),
         ("readings beyond a declared rail", by_hand, |s| s.set("rails.accel", "[-32768.0, 14000.0]"), &["accel_z saturated"]),
-        (
-            "vibration in one step",
-            on_table,
-            |s| {
-                let column = s.column("accel_x");
-                for (k, row) in s.rows[s.dwells[7].clone()].iter_mut().enumerate() {
-                    row[column] += 400.0 * (k as f64).sin();
-                }
-            },
-            &["1 dwell (7) is not used: not still enough for the accel"],
-        ),
-        (
-            "one absurd sample in a turn, where a converter ends",
-            by_hand,
-            |s| {
-                let turn = s.turn(2).start + 70;
-                s.edit("gyro_x", turn..turn + 1, |_| 32767.0);
-            },
-            &[
-                "gyro_x: 1 sample at 32767",
-                "the turn from dwell 2 to 3 is not used: gyro_x is at its rail",
-            ],
-        ),
-        (
-            "one absurd sample in a turn",
-            by_hand,
-            |s| {
-                let turn = s.turn(2).start + 70;
-                s.edit("gyro_x", turn..turn + 1, |_| 32000.0);
-            },
-            &["the turn from dwell 2 to 3 is not used: it ends"],
-        ),
+        ("vibration in one step", on_table, |s| s.shake("accel_x", 7), &["1 dwell (7) is not used: not still enough for the accel"]),
+        ("one absurd sample in a turn, where a converter ends", by_hand, |s| s.edit("gyro_x", within(&s.turn(2), 70, 1), |_| 32767.0), &["gyro_x: 1 sample at 32767", "the turn from dwell 2 to 3 is not used: gyro_x is at its rail"]),
+        ("one absurd sample in a turn", by_hand, |s| s.edit("gyro_x", within(&s.turn(2), 70, 1), |_| 32000.0), &["the turn from dwell 2 to 3 is not used: it ends"]),
     ];
     for (name, base, damage, words) in cases {
         println!("{name}");
@@ -164,43 +35,4 @@ fn what_can_be_left_out_is_named_and_the_result_is_right() {
         warned(&result, words);
         right(&result);
     }
-}
-
-#[test]
-fn temperatures_that_are_none_are_counted_in_the_same_words_by_every_command() {
-    let mut samples = by_hand();
-    samples.names.push("temp_c".into());
-    samples.rows.iter_mut().for_each(|row| row.push(21.0));
-    let dwell = samples.dwells[4].clone();
-    let bad = dwell.start + 20..dwell.start + 50;
-    samples.edit("temp_c", bad.clone(), |_| -7049.0);
-    let time = |row: usize| samples.rows[row][0];
-    let [from, to, first] = [dwell.start, dwell.end - 1, bad.start].map(time);
-    let place = Place::with(&samples);
-    let (recording, calibration) = (place.text("rec"), place.text("cal.toml"));
-    let words = |of: usize| {
-        format!(
-            "30 of {of} values cannot be temperatures in °C, the first is -7049 at {first:.1} s"
-        )
-    };
-    let all = samples.rows.len();
-    let warned = |arguments: &[&str], of: usize| {
-        let result = mimu(arguments.iter().chain(&["--json", "-"])).json();
-        let said = format!("temp_c: {}: left empty", words(of));
-        let warnings = result["warnings"].as_array().unwrap();
-        assert!(
-            warnings.iter().any(|w| w["text"] == said.as_str()),
-            "{arguments:?}: {said} in {warnings:?}"
-        );
-    };
-    warned(&["fit", &recording, "-o", &calibration], all);
-    warned(&["verify", &recording, "--calibration", &calibration], all);
-    warned(&["diagnose", &recording], all);
-    let [from, to] = [from, to].map(|t| t.to_string());
-    warned(
-        &["allan", &recording, "--from", &from, "--to", &to],
-        dwell.len(),
-    );
-    let told = words(all);
-    mimu(["thermal", "fit", &recording]).refused(&["temp_c", &told, "mimu import --scale"]);
 }

@@ -8,7 +8,7 @@ use std::f64::consts::PI;
 mod answer;
 mod damage;
 mod files;
-mod generator;
+pub mod generator;
 mod left_out;
 mod listed;
 mod refused;
@@ -23,40 +23,11 @@ fn what_only_its_owner_can_judge_is_a_warning() {
     let cases: &[Case] = &[
         ("two axes of the gyro swapped", by_hand, |s| swap(s, "gyro_x", "gyro_y"), &["gyro: the axes are left-handed"]),
         ("two axes of the accelerometer swapped", by_hand, |s| swap(s, "accel_x", "accel_y"), &["gyro: its axes are rotated by 180 degrees"]),
-        (
-            "all axes of the gyro in another order",
-            on_table,
-            |s| {
-                swap(s, "gyro_x", "gyro_y");
-                swap(s, "gyro_y", "gyro_z");
-            },
-            &["gyro: its axes are rotated by 121 degrees relative to those of the ref_ columns"],
-        ),
-        (
-            "degrees for radians",
-            by_hand,
-            |s| {
-                s.set("raw_unit", "\"SI\"");
-                scale(s, "accel", 1.0 / 1640.0);
-                scale(s, "gyro", 180.0 / PI / 5000.0);
-            },
-            &["gyro: raw_unit = \"SI\"", "they are in deg/s"],
-        ),
+        ("all axes of the gyro in another order", on_table, |s| { swap(s, "gyro_x", "gyro_y"); swap(s, "gyro_y", "gyro_z") }, &["gyro: its axes are rotated by 121 degrees relative to those of the ref_ columns"]),
+        ("degrees for radians", by_hand, |s| { s.in_si(); scale(s, "gyro", 180.0 / PI) }, &["gyro: raw_unit = \"SI\"", "they are in deg/s"]),
         ("counts for SI", by_hand, |s| s.set("raw_unit", "\"SI\""), &["accel: raw_unit = \"SI\"", "1632 times"]),
-        (
-            "the first rows at the full scale of a gyro in SI",
-            by_hand,
-            |s| {
-                s.set("raw_unit", "\"SI\"");
-                scale(s, "accel", 1.0 / 1640.0);
-                scale(s, "gyro", 1.0 / 5000.0);
-                // As an import with a factor of six digits writes 250 deg/s.
-                for column in ["gyro_x", "gyro_y", "gyro_z"] {
-                    s.edit(column, 0..1, |_| 250.0 * 0.0174533);
-                }
-            },
-            &["gyro_y: 1 sample at 4.363325", "full scale"],
-        ),
+        // As an import with a factor of six digits writes 250 deg/s.
+        ("the first rows at the full scale of a gyro in SI", by_hand, |s| { s.in_si(); s.rows[0][1..4].fill(250.0 * 0.0174533) }, &["gyro_y: 1 sample at 4.363325", "full scale"]),
         ("nothing but poses on the table", || on_table_at(&[0.0], &[0, 1, 2]), |_| {}, &["gyro: not calibrated: all dwells have the same input"]),
     ];
     for (name, base, damage, words) in cases {
@@ -67,6 +38,13 @@ fn what_only_its_owner_can_judge_is_a_warning() {
     }
 }
 
+fn beginning_at(offset_s: f64) -> Samples {
+    let mut samples = by_hand();
+    let all = samples.all();
+    samples.edit("t_s", all, |t| t + offset_s);
+    samples
+}
+
 #[test]
 fn a_clean_recording_gives_the_truth_within_its_intervals_and_no_warning() {
     for (samples, arguments) in [
@@ -75,6 +53,10 @@ fn a_clean_recording_gives_the_truth_within_its_intervals_and_no_warning() {
         (by_hand(), vec!["--holdout", "blocks=1000"]),
         (on_table(), vec![]),
         (on_table(), vec!["--holdout", "blocks=0"]),
+        // One direction of each rate is enough, and times may begin anywhere.
+        (on_table_at(&[0.0, 30.0, 90.0], &[0, 1, 2]), vec![]),
+        (beginning_at(-1000.0), vec![]),
+        (beginning_at(1.7e9), vec![]),
     ] {
         let result = Place::with(&samples).fit(&arguments).json();
         right(&result);
@@ -83,12 +65,6 @@ fn a_clean_recording_gives_the_truth_within_its_intervals_and_no_warning() {
         let warnings: Vec<String> = warnings(&result).into_iter().filter(others).collect();
         assert_eq!(warnings, [""; 0], "{arguments:?}");
     }
-}
-
-#[test]
-fn one_direction_of_each_rate_is_enough() {
-    let samples = on_table_at(&[0.0, 30.0, 90.0], &[0, 1, 2]);
-    right(&Place::with(&samples).fit(&[]).json());
 }
 
 #[test]
@@ -121,14 +97,4 @@ fn a_sensor_that_is_not_there_cannot_be_fitted_alone() {
         .refused(&["samples.csv", "no gyro", "fit the other sensor"]);
     let result = Place::with(&on_table()).fit(&["--only", "accel"]).json();
     assert!(result["sensors"]["gyro"].is_null() && distance(&result, "accel") < 2.0);
-}
-
-#[test]
-fn times_may_begin_anywhere() {
-    for offset in [-1000.0, 1.7e9] {
-        let mut samples = by_hand();
-        let all = samples.all();
-        samples.edit("t_s", all, |t| t + offset);
-        right(&Place::with(&samples).fit(&[]).json());
-    }
 }

@@ -6,7 +6,7 @@ use mimu::calibration::Calibration;
 use mimu_recording::{Batch, RawUnit, Recording};
 
 use super::mimu;
-use super::unit::{CUBIC, DWELLS, NOISE, RATE_HZ, SAG, THERMAL, fitted, forward, named, record};
+use super::unit::{DWELLS, NOISE, RATE_HZ, calibrated, fitted, flaws, forward};
 
 pub fn read(folder: &Path) -> (Recording, Batch) {
     let recording = Recording::open(folder).unwrap();
@@ -47,21 +47,9 @@ fn a_compensated_recording_is_the_input_of_the_bench_and_keeps_what_is_missing()
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
     let text = |name: &str| path(name).to_str().unwrap().to_string();
-    record(&path("clean"), false, true);
-    record(&path("flawed"), true, true);
-    let effects = [
-        named(
-            "gyro_g_sensitivity",
-            &[0.0, 0.0, SAG, SAG, 0.0, 0.0, 0.0, 0.0, 0.0],
-        ),
-        named("gyro_thermal_bias", &[0.0, 0.0, THERMAL, 0.0, 0.0, 0.0]),
-        named("accel_scale_cubic", &[CUBIC; 3]),
-    ];
-    let fit = fitted(&path("clean"));
-    for (name, tables) in [("cal.toml", &effects[..]), ("affine.toml", &[])] {
-        let calibration = Calibration::of(&fit, tables, "2026-01-01T00:00:00Z").unwrap();
-        std::fs::write(path(name), calibration.to_toml()).unwrap();
-    }
+    calibrated(folder.path(), &flaws());
+    let affine = Calibration::of(&fitted(&path("clean")), &[], "2026-01-01T00:00:00Z").unwrap();
+    std::fs::write(path("affine.toml"), affine.to_toml()).unwrap();
     // Half a second is missing, a cell is empty, and gyro x is at its rail for three samples.
     let samples = path("flawed").join("samples.csv");
     let lines: Vec<String> = std::fs::read_to_string(&samples)

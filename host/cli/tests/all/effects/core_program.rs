@@ -1,10 +1,8 @@
 //! The program of mimu-core's README against `mimu apply`, on the same samples.
 
-use mimu::calibration::Calibration;
-
 use super::applied::read;
 use super::mimu;
-use super::unit::{CUBIC, RATE_HZ, SAG, THERMAL, fitted, named, record};
+use super::unit::{RATE_HZ, calibrated, flaws};
 
 #[rustfmt::skip]
 #[path = "../../../../../core/examples/stream/calibrate.rs"]
@@ -15,19 +13,7 @@ fn the_program_of_the_readme_of_core_gives_what_apply_gives() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
     let text = |name: &str| path(name).to_str().unwrap().to_string();
-    record(&path("clean"), false, true);
-    record(&path("flawed"), true, true);
-    let effects = [
-        named(
-            "gyro_g_sensitivity",
-            &[0.0, 0.0, SAG, SAG, 0.0, 0.0, 0.0, 0.0, 0.0],
-        ),
-        named("gyro_thermal_bias", &[0.0, 0.0, THERMAL, 0.0, 0.0, 0.0]),
-        named("accel_scale_cubic", &[CUBIC; 3]),
-    ];
-    let fit = fitted(&path("clean"));
-    let calibration = Calibration::of(&fit, &effects, "2026-01-01T00:00:00Z").unwrap();
-    std::fs::write(path("cal.toml"), calibration.to_toml()).unwrap();
+    calibrated(folder.path(), &flaws());
     let (cal, core) = (text("cal.toml"), text("unit.mimc"));
     let (done, said) = mimu(&["export", "core", "--calibration", &cal, "-o", &core]);
     assert!(done, "{said}");

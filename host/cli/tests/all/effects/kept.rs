@@ -3,7 +3,7 @@
 use mimu::calibration::Calibration;
 use mimu_device::{Image, calibration};
 
-use super::unit::{CUBIC, SAG, fitted, named, record};
+use super::unit::{calibrated, fitted, flaws, record};
 use super::{every_effect, mimu};
 
 const CREATED: &str = "2026-01-01T00:00:00Z";
@@ -38,20 +38,10 @@ fn the_other_commands_take_what_was_fetched_and_say_what_they_lack() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
     let text = |name: &str| path(name).display().to_string();
-    record(&path("clean"), false, true);
-    record(&path("flawed"), true, true);
-    let effects = [
-        named(
-            "gyro_g_sensitivity",
-            &[0.0, 0.0, SAG, SAG, 0.0, 0.0, 0.0, 0.0, 0.0],
-        ),
-        named("accel_scale_cubic", &[CUBIC; 3]),
-    ];
-    let made = Calibration::of(&fitted(&path("clean")), &effects, CREATED);
-    let made = made.unwrap();
+    let [sag, _, cubic] = flaws();
+    let made = calibrated(folder.path(), &[sag, cubic]);
     let (_, kept) = fetched(&made);
     assert!(made.is_uncertain() && !kept.is_uncertain());
-    std::fs::write(path("made.toml"), made.to_toml()).unwrap();
     std::fs::write(path("kept.toml"), kept.to_toml()).unwrap();
     let run = |command: &[&str], file: &str| {
         let calibration = text(file);
@@ -62,7 +52,7 @@ fn the_other_commands_take_what_was_fetched_and_say_what_they_lack() {
     };
     let flawed = text("flawed");
     for sensor in ["gyro", "accel"] {
-        let [before, after] = ["made.toml", "kept.toml"].map(|file| {
+        let [before, after] = ["cal.toml", "kept.toml"].map(|file| {
             let judged = run(&["verify", &flawed], file);
             judged["sensors"][sensor]["rms"].as_f64().unwrap()
         });
@@ -79,5 +69,5 @@ fn the_other_commands_take_what_was_fetched_and_say_what_they_lack() {
         warnings.contains("has no uncertainty")
     };
     assert!(lacks(&run(&["diagnose", &flawed], "kept.toml")));
-    assert!(!lacks(&run(&["diagnose", &flawed], "made.toml")));
+    assert!(!lacks(&run(&["diagnose", &flawed], "cal.toml")));
 }

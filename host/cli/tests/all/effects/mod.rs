@@ -23,8 +23,8 @@ use mimu_core::compensation::Sample;
 use mimu_core::effects::{Effects, State};
 use nalgebra::Vector3;
 
-use crate::command::{run as command, says};
-use unit::{CUBIC, SAG, THERMAL, fitted, fitted_effect, named, record};
+use crate::command::run as command;
+use unit::{fitted, fitted_effect, record};
 
 /// All named effects, some with only part of their coefficients, and three terms; at ten times data-sheet size.
 fn every_effect() -> Vec<FittedEffect> {
@@ -121,86 +121,4 @@ pub fn mimu(arguments: &[&str]) -> (bool, String) {
         Some(0) => (true, ran.stdout),
         _ => (false, ran.stderr),
     }
-}
-
-#[test]
-fn verifying_shows_the_error_with_the_effects_removed_and_left() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = |name: &str| folder.path().join(name);
-    let text = |name: &str| path(name).to_str().unwrap().to_string();
-    record(&path("clean"), false, true);
-    record(&path("flawed"), true, true);
-    record(&path("cold"), true, false);
-    let effects = [
-        named(
-            "gyro_g_sensitivity",
-            &[0.0, 0.0, SAG, SAG, 0.0, 0.0, 0.0, 0.0, 0.0],
-        ),
-        named("gyro_thermal_bias", &[0.0, 0.0, THERMAL, 0.0, 0.0, 0.0]),
-        named("accel_scale_cubic", &[CUBIC; 3]),
-    ];
-    // The affine part is that of the unit without flaws, and the effects are its flaws: only noise remains.
-    let fit = fitted(&path("clean"));
-    std::fs::write(
-        path("cal.toml"),
-        Calibration::of(&fit, &effects, "2026-01-01T00:00:00Z")
-            .unwrap()
-            .to_toml(),
-    )
-    .unwrap();
-    let calibration = text("cal.toml");
-    let arguments = |recording: &str| {
-        let recording = text(recording);
-        [
-            "verify".into(),
-            recording,
-            "--calibration".into(),
-            calibration.clone(),
-        ]
-    };
-    let run = |recording: &str, more: &[&str]| {
-        let all = arguments(recording);
-        mimu(
-            &all.iter()
-                .map(String::as_str)
-                .chain(more.iter().copied())
-                .collect::<Vec<_>>(),
-        )
-    };
-    let (done, json) = run("flawed", &["--json", "-"]);
-    assert!(done, "{json}");
-    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
-    for sensor in ["gyro", "accel"] {
-        let figure = |key: &str| json["sensors"][sensor][key].as_f64().unwrap();
-        let floor = figure("noise_floor");
-        assert!(
-            figure("rms") < 1.5 * floor,
-            "{sensor}: {} {floor}",
-            figure("rms")
-        );
-        assert!(
-            figure("rms_affine") > 10.0 * floor,
-            "{sensor}: {}",
-            figure("rms_affine")
-        );
-        assert!(figure("rms_raw") > figure("rms_affine"), "{sensor}");
-    }
-    let (_, shown) = run("flawed", &[]);
-    let table = shown.lines().find(|l| l.starts_with("rms error")).unwrap();
-    assert!(table.contains("effects left in"), "{shown}");
-
-    let (done, refusal) = run("cold", &[]);
-    assert!(!done);
-    says(&refusal, &["gyro_thermal_bias", "temp_c is missing"]);
-
-    // Without effects there is no output about them.
-    std::fs::write(
-        path("cal.toml"),
-        Calibration::of(&fit, &[], "2026-01-01T00:00:00Z")
-            .unwrap()
-            .to_toml(),
-    )
-    .unwrap();
-    let (done, json) = run("cold", &["--json", "-"]);
-    assert!(done && !json.contains("rms_affine"), "{json}");
 }

@@ -67,26 +67,3 @@ fn an_effect_that_was_edited_or_that_nobody_knows_is_refused_by_its_name() {
         .to_string();
     says(&refusal, &["gyro_g_sensitivity", "[accel]"]);
 }
-
-#[test]
-fn more_effects_than_the_device_has_room_for_are_refused_by_name() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("recording");
-    record(&path, false, true);
-    let effects = [
-        "gyro_scale_cubic",
-        "accel_scale_cubic",
-        "gyro_scale_quadratic",
-    ]
-    .map(|id| named(id, &[1e-7; 3]));
-    let text = Calibration::of(&fitted(&path), &effects, "2026-01-01T00:00:00Z")
-        .unwrap()
-        .to_toml();
-    let calibration = Calibration::parse(&text, "cal.toml").unwrap();
-    assert!(calibration.core_effects::<f32, 2>().is_ok());
-    let refusal = calibration
-        .core_effects::<f32, 1>()
-        .unwrap_err()
-        .to_string();
-    says(&refusal, &["gyro_scale_quadratic", "at most 1"]);
-}

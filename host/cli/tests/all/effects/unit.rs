@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
+use mimu::calibration::Calibration;
 use mimu::effects;
 use mimu::effects::candidate::{Candidate, CandidateKind};
 use mimu::effects::fitted::FittedEffect;
@@ -124,6 +125,26 @@ pub fn prepared(folder: &Path) -> Prepared {
 
 pub fn fitted(folder: &Path) -> Fit {
     fit(prepared(folder), Options::IN_SAMPLE).unwrap()
+}
+
+/// The flaws of the unit of [`record`].
+pub fn flaws() -> [FittedEffect; 3] {
+    let sag = [0.0, 0.0, SAG, SAG, 0.0, 0.0, 0.0, 0.0, 0.0];
+    [
+        named("gyro_g_sensitivity", &sag),
+        named("gyro_thermal_bias", &[0.0, 0.0, THERMAL, 0.0, 0.0, 0.0]),
+        named("accel_scale_cubic", &[CUBIC; 3]),
+    ]
+}
+
+/// Records the unit without and with its flaws, as `clean` and `flawed`, and writes its calibration with these effects as `cal.toml`.
+pub fn calibrated(folder: &Path, effects: &[FittedEffect]) -> Calibration {
+    record(&folder.join("clean"), false, true);
+    record(&folder.join("flawed"), true, true);
+    let fit = fitted(&folder.join("clean"));
+    let made = Calibration::of(&fit, effects, "2026-01-01T00:00:00Z").unwrap();
+    std::fs::write(folder.join("cal.toml"), made.to_toml()).unwrap();
+    made
 }
 
 /// With an uncertainty of 1 %.

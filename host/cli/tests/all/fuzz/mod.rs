@@ -11,7 +11,6 @@
 
 mod mutation;
 
-use std::fmt::Write as _;
 use std::fs;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
@@ -32,12 +31,13 @@ use mimu_recording::{
     ColumnList, ImportOptions, LogOptions, RawUnit, Recording, Reference, SampleFormat, import,
 };
 
+use crate::bad_input::generator::{by_hand_at, on_table_at};
 use mutation::*;
 
 const DEFAULT_SEED: u64 = 20_260_101;
 const DEFAULT_SECONDS: u64 = 12;
 /// A case takes some milliseconds; after this time it counts as hanging.
-const HANG: Duration = Duration::from_secs(60);
+const HANG: Duration = Duration::from_secs(600);
 
 const MANIFEST: &str = r#"format = "mimu-recording/1"
 device = "unit-7"
@@ -53,82 +53,25 @@ turn_steps = [25]
 gyro = [-32768.0, 32767.0]
 "#;
 
-/// Readings of a sensor at `x`: with different matrices for gyro and accelerometer, which suffices here.
-fn reading(sensor: usize, x: [f64; 3], random: &mut Random) -> [i64; 3] {
-    let scale = [5000.0, 1600.0][sensor];
-    [0, 1, 2].map(|i| {
-        let skewed = x[i] + 0.01 * x[(i + 1) % 3] - 0.02 * x[(i + 2) % 3];
-        let noise: f64 = (0..4).map(|_| random.uniform() - 0.5).sum();
-        (scale * skewed + 40.0 * (i as f64 - 1.0) + 10.0 * noise).round() as i64
-    })
-}
-
-/// Poses with turns about changing axes, at 20 Hz. With `table`, the inputs are given.
+/// A recording of the generator at 20 Hz, with steps and a temperature.
 fn samples(table: bool) -> String {
-    const POSE: usize = 30;
-    const TURN: usize = 16;
-    let mut random = Random(7);
-    let mut out = String::from("t_s,step,temp_c,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z");
-    if table {
-        out.push_str(",ref_rate_x_dps,ref_rate_y_dps,ref_rate_z_dps,ref_force_x_mps2,ref_force_y_mps2,ref_force_z_mps2");
-    }
-    out.push('\n');
-    let mut up = [0.0, 0.0, 1.0];
-    let mut row = 0;
-    for pose in 0..13_usize {
-        let axis: [f64; 3] = [
-            0.3 + (pose % 3) as f64,
-            1.0 - (pose % 2) as f64,
-            0.7 - (pose % 5) as f64,
-        ];
-        let size = axis.iter().map(|a| a * a).sum::<f64>().sqrt();
-        let axis = axis.map(|a| a / size);
-        let angle = 1.2 + 0.1 * (pose % 4) as f64;
-        for k in 0..POSE + TURN {
-            let turning = k >= POSE;
-            let mut rate = [0.0; 3];
-            if turning {
-                let part = (k - POSE) as f64 / TURN as f64;
-                let size = angle * (1.0 - (2.0 * std::f64::consts::PI * part).cos())
-                    / (TURN as f64 / 20.0);
-                rate = axis.map(|a| a * size);
-                // In the body frame, a direction that is fixed in the world changes by up × rate.
-                let step = rate.map(|r| r / 20.0);
-                let turned = [
-                    up[1] * step[2] - up[2] * step[1],
-                    up[2] * step[0] - up[0] * step[2],
-                    up[0] * step[1] - up[1] * step[0],
-                ];
-                let moved = [0, 1, 2].map(|i| up[i] + turned[i]);
-                let size = moved.iter().map(|a| a * a).sum::<f64>().sqrt();
-                up = moved.map(|a| a / size);
-            } else if table {
-                rate = axis.map(|a| a * (pose % 3) as f64);
-            }
-            let force = up.map(|u| 9.81 * u);
-            let step = if turning { -1 } else { pose as i64 };
-            let [gx, gy, gz] = reading(0, rate, &mut random);
-            let [ax, ay, az] = reading(1, force, &mut random);
-            let t = f64::from(row) / 20.0;
-            let _ = write!(
-                out,
-                "{t},{step},25.{},{gx},{gy},{gz},{ax},{ay},{az}",
-                row % 10
-            );
-            if table {
-                let cells = rate.map(f64::to_degrees).into_iter().chain(force);
-                for cell in cells {
-                    let _ = match turning {
-                        true => write!(out, ","),
-                        false => write!(out, ",{cell:.4}"),
-                    };
-                }
-            }
-            out.push('\n');
-            row += 1;
+    let mut samples = match table {
+        true => on_table_at(&[-60.0, 0.0, 60.0], &[0, 1, 2]),
+        false => by_hand_at(12, 7, Random::direction),
+    };
+    if !table {
+        samples.names.insert(1, "step".into());
+        for (row, cells) in samples.rows.iter_mut().enumerate() {
+            let step = samples.dwells.iter().position(|dwell| dwell.contains(&row));
+            cells.insert(1, step.map_or(-1.0, |step| step as f64));
         }
     }
-    out
+    samples.names.insert(2, "temp_c".into());
+    for (row, cells) in samples.rows.iter_mut().enumerate() {
+        cells.insert(2, 25.0 + 0.1 * (row % 10) as f64);
+    }
+    samples.keep_every(5, 0);
+    samples.csv()
 }
 
 /// Without the column `step`, so that dwells must be found.

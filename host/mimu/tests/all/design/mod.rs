@@ -1,6 +1,5 @@
 //! The search finds optima that are known from elsewhere, and designs are judged as by hand calculation.
 
-mod brute_force;
 mod next_experiment;
 mod population;
 #[allow(dead_code)] // the tables of the papers use the rest

@@ -5,7 +5,7 @@ use mimu::plan::design::budget::DwellNoise;
 use mimu::plan::design::reach::{Fixture, RateList, Rates};
 use mimu::plan::design::tour::Motion;
 use mimu::plan::next_experiment::prediction::{SEEN, Target};
-use mimu::plan::next_experiment::recipe::{Course, Experiment, Inputs, RECIPES};
+use mimu::plan::next_experiment::recipe::{Experiment, RECIPES};
 use mimu::plan::next_experiment::{Answer, CHAMBER_C, DWELL_S, RATE_DPS, SLEW, Setup, smallest};
 use mimu::quantity::Sensor;
 use mimu_recording::Reference;
@@ -126,25 +126,6 @@ fn the_size_is_the_smallest_that_is_enough_by_the_noise_of_the_unit() {
 }
 
 #[test]
-fn what_depends_on_time_begins_cold_and_what_depends_on_temperature_goes_up_and_down() {
-    let setup = setup();
-    let warm_up = answer(&setup, "accel_warm_up").unwrap();
-    assert_eq!(warm_up.experiment.recipe.course, Course::ColdStart);
-    assert!(
-        warm_up
-            .words(&setup)
-            .starts_with("Switch the unit off and let it cool down")
-    );
-    for id in ["gyro_thermal_bias", "gyro_thermal_lag"] {
-        let chamber = answer(&setup, id).unwrap().experiment.chamber_c;
-        let temperatures: Vec<f64> = chamber.iter().map(|c| c[1]).collect();
-        let (first, last) = (temperatures[0], temperatures[temperatures.len() - 1]);
-        assert!(first == 25.0 && last == 25.0);
-        assert!(temperatures.iter().any(|t| *t > 25.0) && temperatures.iter().any(|t| *t < 25.0));
-    }
-}
-
-#[test]
 fn what_a_fixture_cannot_show_has_no_recipe() {
     // By hand a gyro has no known rate; on six faces the products of two forces are always zero.
     let by_hand = Setup {
@@ -161,16 +142,4 @@ fn what_a_fixture_cannot_show_has_no_recipe() {
     };
     assert!(answer(&faces, "accel_cross_axis_product").is_none());
     assert!(cubic(&faces).is_some());
-}
-
-#[test]
-fn a_person_reads_what_to_do_with_numbers_and_units() {
-    let setup = setup();
-    let cubic = cubic(&setup).unwrap();
-    assert_eq!(cubic.experiment.recipe.inputs, Inputs::Rates);
-    let words = cubic.words(&setup);
-    let says = "in each of 18 states, in a randomised order";
-    assert!(words.contains(says), "{words}");
-    let says = "rest with each axis up and down (6 attitudes); turn at ±150 and ±300 deg/s about each axis.";
-    assert!(words.ends_with(says), "{words}");
 }
