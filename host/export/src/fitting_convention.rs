@@ -7,7 +7,7 @@
 use mimu::calibration::Calibration;
 use mimu::calibration::verify::{SensorVerification, verify};
 use mimu::prepared::Prepared;
-use mimu::quantity::{AXES, PerSensor, Sensor};
+use mimu::quantity::{AXES, PerSensor, Sensor, plural};
 use mimu::readable::{self, STANDARD_GRAVITY};
 use mimu_allan::model::Term;
 use mimu_core::compensation::Affine;
@@ -69,7 +69,7 @@ impl Reading {
         if let [first, ..] = self.alike.as_slice() {
             let more = match self.alike.len() - 1 {
                 0 => String::new(),
-                more => format!(", or in {more} further ways"),
+                more => format!(", or in {}", plural(more as u64, "further way")),
             };
             text += &format!(". Read {first}{more}, it fits as well");
         }
@@ -124,7 +124,9 @@ pub fn calibration(foreign: &Foreign, prepared: &Prepared) -> Result<(Calibratio
                 candidates.push((changed, model, judged));
             }
         }
-        let best = candidates.iter().min_by(|a, b| merit(a).total_cmp(&merit(b)));
+        let best = candidates
+            .iter()
+            .min_by(|a, b| merit(a).total_cmp(&merit(b)));
         let Some(best) = best else {
             models[sensor] = foreign.format.convention.inverse(&parts);
             continue;
@@ -290,7 +292,7 @@ fn orders() -> Vec<(String, Matrix3<f64>)> {
         [1, 0, 2],
     ] {
         for signs in 0..8 {
-            let sign = |i: usize| if signs >> i & 1 == 0 { 1.0 } else { -1.0 };
+            let sign = |i: usize| if (signs >> i) & 1 == 0 { 1.0 } else { -1.0 };
             let turned = Matrix3::from_fn(|i, j| if order[i] == j { sign(i) } else { 0.0 });
             if turned.determinant() > 0.0 {
                 let axis = |i: usize| match sign(i) < 0.0 {

@@ -86,9 +86,8 @@ impl SensorVerification {
     pub fn exceeds(&self, other: &Self, gain: f64) -> bool {
         let at_rest = self.static_rms.zip(other.static_rms);
         exceeds(self.rms, other.rms, self.figure, self.count)
-            || at_rest.is_some_and(|(own, other)| {
-                exceeds(own, gain * other, Figure::Input, self.count)
-            })
+            || at_rest
+                .is_some_and(|(own, other)| exceeds(own, gain * other, Figure::Input, self.count))
     }
 }
 
