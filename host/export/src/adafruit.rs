@@ -15,6 +15,7 @@ use mimu::quantity::Sensor;
 use mimu_recording::error::Result;
 use serde_json::{Map, Value, json};
 
+use crate::biases::biases;
 use crate::convention::{Bias, Convention, Shape};
 use crate::layout::{Entry, Numbers};
 use crate::remaining::Places;
@@ -83,7 +84,7 @@ impl Target for Adafruit {
                 .flatten(),
         );
         let missing = "nothing is written for it";
-        for (entry, parts) in options.driver.biases::<Self>(from, missing, &mut export)? {
+        for (entry, parts) in biases::<Self>(&options.driver, from, missing, &mut export)? {
             let (sensor, name) = (entry.sensor, entry.key);
             let unit = sensor.unit();
             export.formula(format!("{sensor}: output = reading - {name}, {unit}"));

@@ -13,9 +13,7 @@ use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{RawUnit, TriadName};
 use nalgebra::{Matrix3, Vector3};
 
-use crate::convention::Parts;
-use crate::layout::Entry;
-use crate::{Export, Sources, Target, remaining};
+use crate::Sources;
 
 /// The user's knowledge of the driver.
 #[derive(Debug, Clone, Default, Args)]
@@ -102,35 +100,6 @@ impl Options {
             format!("give the factor by which the program converts, {} per {raw}", sensor.unit()),
         )
         .about(argument))
-    }
-
-    /// The numbers of the calibrated triads, by the entries of a format with a bias for each axis. Adds notes on the readings, of which `missing` ends the one on
-    /// a triad that is not calibrated, and what is left of scale factors.
-    ///
-    /// # Errors
-    /// The calibration is missing, or those of [`Self::readings`].
-    pub(crate) fn biases<T: Target>(
-        &self,
-        from: &Sources,
-        missing: &str,
-        export: &mut Export,
-    ) -> Result<Vec<(&'static Entry, Parts)>> {
-        let (calibration, place) = from.calibration()?;
-        let mut all = Vec::new();
-        for entry in T::LAYOUT {
-            let sensor = entry.sensor;
-            if calibration.table(sensor).is_none() {
-                export.note(format!("The calibration has no {sensor}, so {missing}."));
-                continue;
-            }
-            let readings = self.readings(calibration, place, sensor)?;
-            export.note(readings.line());
-            let gain = readings.forward.matrix.diagonal();
-            let error = remaining::scale_factors(sensor, &gain);
-            export.remaining.push(error);
-            all.push((entry, T::CONVENTION.of(&readings)?));
-        }
-        Ok(all)
     }
 
     /// The driver's readings of both triads of the calibration.

@@ -7,7 +7,7 @@
 use mimu::calibration::Calibration;
 use mimu::calibration::verify::{SensorVerification, verify};
 use mimu::prepared::Prepared;
-use mimu::quantity::{AXES, PerSensor, Sensor};
+use mimu::quantity::{AXES, PerSensor, Sensor, plural};
 use mimu::readable::{self, STANDARD_GRAVITY};
 use mimu_allan::model::Term;
 use mimu_core::compensation::Affine;
@@ -66,8 +66,12 @@ impl Reading {
         if self.bias_of_recording {
             text += ". The file has no bias, so that of this recording is used";
         }
-        if !self.alike.is_empty() {
-            text += &format!(". Read {}, it fits as well", self.alike.join(", or "));
+        if let [first, ..] = self.alike.as_slice() {
+            let more = match self.alike.len() - 1 {
+                0 => String::new(),
+                more => format!(", or in {}", plural(more as u64, "further way")),
+            };
+            text += &format!(". Read {first}{more}, it fits as well");
         }
         if let Some((file, here)) = self.file_noise.zip(self.noise) {
             let density = format!("{}/sqrt(Hz)", self.sensor.unit());
@@ -120,15 +124,15 @@ pub fn calibration(foreign: &Foreign, prepared: &Prepared) -> Result<(Calibratio
                 candidates.push((changed, model, judged));
             }
         }
-        let by_error = |c: &&(String, Affine<f64>, SensorVerification)| merit(&c.2);
         let best = candidates
             .iter()
-            .min_by(|a, b| by_error(a).total_cmp(&by_error(b)));
-        let Some((_, _, best)) = best.cloned() else {
+            .min_by(|a, b| merit(a).total_cmp(&merit(b)));
+        let Some(best) = best else {
             models[sensor] = foreign.format.convention.inverse(&parts);
             continue;
         };
-        let mut fitting = candidates.iter().filter(|c| !c.2.exceeds(&best));
+        let fits = |c: &&Candidate| !c.2.exceeds(&best.2, gain(&c.1) / gain(&best.1));
+        let mut fitting = candidates.iter().filter(fits);
         let Some((changed, model, found)) = fitting.next() else {
             continue;
         };
@@ -155,9 +159,17 @@ pub fn calibration(foreign: &Foreign, prepared: &Prepared) -> Result<(Calibratio
     Ok((foreign.with(&models, raw_unit)?, all))
 }
 
-/// What the best reading has least of: the error, and that at rest, where a bias shows.
-fn merit(found: &SensorVerification) -> f64 {
-    found.rms * found.static_rms.unwrap_or(1.0)
+/// A reading: what it changes, its calibration, and how this is judged.
+type Candidate = (String, Affine<f64>, SensorVerification);
+
+/// What the best reading has least of: the error, and that at rest, where a bias shows, over the gain.
+fn merit((_, model, found): &Candidate) -> f64 {
+    found.rms * found.static_rms.map_or(1.0, |rms| rms / gain(model))
+}
+
+/// Output for a reading: the mean over all directions.
+fn gain(model: &Affine<f64>) -> f64 {
+    model.matrix.determinant().abs().cbrt()
 }
 
 /// The readings of these numbers, the format's own first and the simpler ones before others, each with what it changes.
@@ -280,7 +292,7 @@ fn orders() -> Vec<(String, Matrix3<f64>)> {
         [1, 0, 2],
     ] {
         for signs in 0..8 {
-            let sign = |i: usize| if signs >> i & 1 == 0 { 1.0 } else { -1.0 };
+            let sign = |i: usize| if (signs >> i) & 1 == 0 { 1.0 } else { -1.0 };
             let turned = Matrix3::from_fn(|i, j| if order[i] == j { sign(i) } else { 0.0 });
             if turned.determinant() > 0.0 {
                 let axis = |i: usize| match sign(i) < 0.0 {

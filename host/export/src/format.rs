@@ -71,7 +71,7 @@ pub trait Target {
     /// Key of the messages a second.
     const RATE_KEY: Option<&str> = None;
     /// For a file that [`Keyed`] does not read: its numbers; `None` if it is another file. The second argument is its path.
-    const UNPACK: Option<fn(&[u8], &str) -> Option<Keyed>> = None;
+    const UNPACK: Option<Unpack> = None;
     /// For a format that stores a whole calibration: that of a file, likewise.
     const WHOLE: Option<Whole> = None;
     /// Whether it stores noise.
@@ -93,6 +93,9 @@ pub trait Target {
 /// For formats without options.
 #[derive(Debug, Clone, Args)]
 pub struct Nothing {}
+
+/// Reads the numbers of a file with these bytes and this path; `None` if it is another file.
+pub type Unpack = fn(&[u8], &str) -> Option<Keyed>;
 
 /// Reads the calibration of a file with these bytes and this path; `None` if it is another file.
 pub type Whole = fn(&[u8], &str) -> Option<Result<Calibration>>;
@@ -117,7 +120,7 @@ pub struct Format {
     pub(crate) takes_raw: bool,
     pub(crate) noise_keys: &'static [NoiseKey],
     pub(crate) rate_key: Option<&'static str>,
-    pub(crate) unpack: Option<fn(&[u8], &str) -> Option<Keyed>>,
+    pub(crate) unpack: Option<Unpack>,
     pub(crate) whole: Option<Whole>,
     about: &'static str,
     augment: fn(Command) -> Command,

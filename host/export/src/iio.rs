@@ -16,6 +16,7 @@ use mimu::quantity::{PerSensor, Sensor};
 use mimu::readable::STANDARD_GRAVITY;
 use mimu_recording::error::{Argument, Result};
 
+use crate::biases::biases;
 use crate::convention::{Bias, Convention, Shape, within};
 use crate::layout::{Entry, Numbers};
 use crate::remaining::{Places, Remaining};
@@ -72,7 +73,7 @@ impl Target for Iio {
         export.leaves(calibration, Places::Axes);
         let mut body = String::new();
         let missing = "its calibbias stays as it is";
-        for (entry, parts) in options.biases::<Self>(from, missing, &mut export)? {
+        for (entry, parts) in biases::<Self>(options, from, missing, &mut export)? {
             let sensor = entry.sensor;
             let argument = match sensor {
                 Sensor::Gyro => Argument::GyroZero,

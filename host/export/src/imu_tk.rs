@@ -11,6 +11,7 @@ use mimu::quantity::Sensor;
 use mimu_recording::error::Result;
 
 use crate::convention::{Bias, Convention, Shape};
+use crate::format::Unpack;
 use crate::keyed::Keyed;
 use crate::layout::{Entry, Numbers};
 use crate::remaining::Places;
@@ -53,7 +54,7 @@ impl Target for ImuTk {
         Entry::of(Sensor::Gyro, Numbers::Right, "gyro/K"),
         Entry::of(Sensor::Gyro, Numbers::Bias, "gyro/B"),
     ];
-    const UNPACK: Option<fn(&[u8], &str) -> Option<Keyed>> = Some(unpacked);
+    const UNPACK: Option<Unpack> = Some(unpacked);
     const PAGES: &[Page] = &[
         Page {
             options: "--sensor accel",

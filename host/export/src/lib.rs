@@ -20,6 +20,7 @@
 //! | [`judged`] | judgements of the sources, and errors that every program inherits |
 //! | `heading` | the comments at the head of every file |
 //! | [`parameters`] | parameters of autopilots, and their file layouts |
+//! | `biases` | biases of each axis alone, for Adafruit and IIO |
 //! | `degrees_per_turn` | scale factors of a gyro alone, for SlimeNRF and the Pigeon 2 |
 //! | `flight_codes` | the accelerometer in whole codes, for Betaflight and INAV |
 //! | `template` | fixed text with places for values |
@@ -29,6 +30,7 @@ pub mod ardupilot;
 pub mod autoware;
 pub mod basalt;
 pub mod betaflight;
+mod biases;
 pub mod body;
 pub mod c;
 pub mod convention;

@@ -17,6 +17,7 @@ use mimu_recording::error::Result;
 use serde_json::json;
 
 use crate::convention::{Bias, Convention, Parts, Shape};
+use crate::format::Unpack;
 use crate::keyed::Keyed;
 use crate::layout::{Entry, Numbers};
 use crate::remaining::Places;
@@ -74,7 +75,7 @@ impl Target for RealSense {
         ),
         Entry::of(Sensor::Gyro, Numbers::Bias, "gyroscope/bias"),
     ];
-    const UNPACK: Option<fn(&[u8], &str) -> Option<Keyed>> = Some(unpacked);
+    const UNPACK: Option<Unpack> = Some(unpacked);
     const PAGES: &[Page] = &[
         Page::of("RealSense, EEPROM", "realsense.bin"),
         Page {

@@ -172,7 +172,7 @@ fn whole(bytes: &[u8], place: &str) -> Option<Result<Calibration>> {
         offset: Vector3::from_column_slice(&of[9..12]).cast(),
     };
     let both = |of: &[f64]| PerSensor::from([affine(&of[..12]), affine(&of[12..])]);
-    let nodes = numbers.chunks_exact(49).map(|of| Node {
+    let nodes = numbers.as_chunks::<49>().0.iter().map(|of| Node {
         temp_c: of[0] as f32,
         model: both(&of[1..25]),
         slope: both(&of[25..]),

@@ -81,11 +81,13 @@ pub struct SensorVerification {
 }
 
 impl SensorVerification {
-    /// Whether a figure of it significantly exceeds that of `other`, which the same data judge.
-    pub fn exceeds(&self, other: &Self) -> bool {
+    /// Whether a figure of it significantly exceeds that of `other`, which the same data judge. `gain`: the output of its calibration over that of the other. At
+    /// rest errors are proportional to the output, so that they are compared at one gain.
+    pub fn exceeds(&self, other: &Self, gain: f64) -> bool {
         let at_rest = self.static_rms.zip(other.static_rms);
         exceeds(self.rms, other.rms, self.figure, self.count)
-            || at_rest.is_some_and(|(own, other)| exceeds(own, other, Figure::Input, self.count))
+            || at_rest
+                .is_some_and(|(own, other)| exceeds(own, gain * other, Figure::Input, self.count))
     }
 }
 
