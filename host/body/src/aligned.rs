@@ -86,7 +86,7 @@ impl Aligned {
     /// Of the triads that both have; with `mean`, of their mean too.
     ///
     /// # Errors
-    /// The samples cannot be read; there is no second gyro or accelerometer for a mean.
+    /// The samples cannot be read; a mean needs a second gyro or accelerometer.
     pub fn of(recording: &Recording, calibration: &Calibration, mean: bool) -> Result<Self> {
         let there = recording.triads();
         let own = calibration.body.iter();

@@ -341,7 +341,7 @@ impl<'a> Problem<'a> {
         LeftOut {
             share: spans.iter().map(|[a, b]| b - a).sum::<f64>() / total,
             size: self.size_rms(&calibration, is_out) / self.size,
-            // NaN, where there is no turn or no rest, is the lesser.
+            // NaN, without a turn or a rest, is the lesser.
             angle_rad: turns.max(dips) / self.size,
             spans,
         }

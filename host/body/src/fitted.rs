@@ -49,7 +49,7 @@ pub struct FittedTriad {
 }
 
 impl FittedTriad {
-    /// Of its relation to the reference, whose errors make `by_reference` of its own; without a lever arm and a dip. `None` if two of its axes read the same.
+    /// Of its relation to the reference, whose errors add `by_reference` to those of its calibration; without a lever arm and a dip. `None` if two of its axes read the same.
     pub(crate) fn of(
         name: TriadName,
         (relation, by_reference): (&Relation, Vec<Part>),

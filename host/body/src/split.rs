@@ -51,7 +51,7 @@ pub struct TurnErrors {
     pub conditions: Vec<[f64; 4]>,
     /// Mean square of each turn's error by what is known to be common, rad²: the Earth's rate about an unknown heading.
     pub shared: Vec<f64>,
-    /// For each pair the dwell of its own that each turn ends in.
+    /// For each pair its dwell in which each turn ends.
     pub places: Vec<Vec<Option<usize>>>,
 }
 

@@ -57,7 +57,7 @@ impl TurnErrors {
         let others = others.filter(|(k, (pair, _))| *k != i && is_known(&pair.errors[j]));
         let (mut sum, mut weights) = (Vector3::zeros(), 0.0);
         for (_, (pair, own)) in others {
-            // A pair that agrees with the others by chance is no better than a hundredth of what it errs by.
+            // A pair that agrees with the others by chance is taken to err by at least a hundredth of what it shows.
             let least = 1e-4 * pair.errors[j].norm_squared();
             let weight = own.max(pair.noise[j].trace()).max(least).recip();
             sum += weight * pair.errors[j];

@@ -68,7 +68,7 @@ pub(crate) fn split_text(split: &Split) -> String {
                 @for (pair, own) in &split.own { (degrees(own, &format!("of pair {pair} alone"), judged(pair))) }
             }))
             p.line { (common_cause(split)) }
-            @if !split.judged.is_empty() { p.line { "the diagnosis of the first pair is of its own part: the mean error of the others is taken out of its turns" } }
+            @if !split.judged.is_empty() { p.line { "the diagnosis of the first pair is by its own part: the mean error of the others is taken out of its turns" } }
             @for (pair, judgement) in split.judged.iter().filter(|(_, of)| !of.is_good()) { p.line { "pair " (pair) " is judged " (judgement) } }
         })
     )
