@@ -24,8 +24,8 @@ mod trajectory_file;
 mod walk;
 
 pub use component::Cause;
-pub use trajectory_file::{Pose, Trajectory};
 pub use estimates::{Estimate, Mounted};
+pub use trajectory_file::{Pose, Trajectory};
 pub use walk::VIBRATION_HZ;
 
 use nalgebra::{DMatrix, Matrix3};
