@@ -124,7 +124,7 @@ impl VerifyArgs {
         &self,
         open: &dyn Fn(DwellSearch) -> Result<Prepared>,
         noise: Option<&NoiseFile>,
-        calibration: &dyn Fn(&Prepared) -> Result<(Calibration, Option<Read>)>,
+        calibration: &AsRead,
     ) -> Result<Verified> {
         let part = self.part.part()?;
         let prepared = with_noise(open(self.still.search())?, noise)?;
@@ -149,6 +149,9 @@ pub struct Verified {
     calibration: Calibration,
     further: BTreeMap<String, TriadVerification>,
 }
+
+/// Gives the calibration of a recording, and how the file of another program was read by it.
+type AsRead<'a> = dyn Fn(&Prepared) -> Result<(Calibration, Option<Read>)> + 'a;
 
 /// How the file of another program was read: as text, and each triad.
 type Read = (String, Vec<Reading>);
