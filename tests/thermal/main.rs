@@ -46,7 +46,7 @@ struct Study {
     blocks: fn(u64) -> Vec<Block>,
 }
 
-const STUDIES: [Study; 7] = [
+const STUDIES: [Study; 6] = [
     Study {
         command: "dies",
         runs: 200,

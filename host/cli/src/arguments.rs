@@ -16,7 +16,7 @@ use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{Reference, WholeTurns};
 use mimu_wizard::procedure::Targets;
 
-use crate::output::check_overwritten;
+use crate::overwriting::check_overwritten;
 use crate::status::Status;
 
 #[derive(Args)]

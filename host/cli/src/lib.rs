@@ -2,6 +2,7 @@
 //!
 //! | module | contents |
 //! |---|---|
+//! | `overwriting` | which files a command may overwrite |
 //! | `cmd` | the subcommands: arguments and execution |
 //! | [`called`] | subcommands that other programs can call |
 //! | `arguments` | arguments that several subcommands share |
@@ -20,6 +21,7 @@ mod hint;
 mod importing;
 mod opening;
 mod output;
+mod overwriting;
 mod reading;
 pub mod report;
 mod status;

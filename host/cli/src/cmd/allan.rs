@@ -14,7 +14,8 @@ use mimu_recording::{MANIFEST_FILE, Recording};
 
 use crate::arguments::{JsonArgs, StrictArgs, VerboseArgs, number};
 use crate::hint::OF_A_LOG;
-use crate::output::{Results, check_outputs, check_overwritten, now, progress};
+use crate::output::{Results, check_outputs, now, progress};
+use crate::overwriting::check_overwritten;
 use crate::reading::{LogArgs, open};
 use crate::status::Status;
 

@@ -14,7 +14,8 @@ use serde_json::json;
 use super::export::written;
 use crate::arguments::JsonArgs;
 use crate::opening::{Opened, open};
-use crate::output::{check_outputs, check_overwritten, print};
+use crate::output::{check_outputs, print};
+use crate::overwriting::check_overwritten;
 
 /// Name of the format of mimu's own file.
 const OWN: &str = "mimu";

@@ -20,7 +20,8 @@ use nalgebra::Vector3;
 use serde::Serialize;
 
 use crate::arguments::{JsonArgs, SensorArg, VerboseArgs, number};
-use crate::output::{Results, check_outputs, check_overwritten};
+use crate::output::{Results, check_outputs};
+use crate::overwriting::check_overwritten;
 use crate::report;
 use noise::NoiseArg;
 

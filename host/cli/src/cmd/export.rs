@@ -13,7 +13,8 @@ use mimu_recording::result_file::stage;
 use serde::Serialize;
 
 use crate::arguments::JsonArgs;
-use crate::output::{check_outputs, check_overwritten, print};
+use crate::output::{check_outputs, print};
+use crate::overwriting::check_overwritten;
 
 #[derive(Args)]
 #[command(subcommand_value_name = "FORMAT", subcommand_help_heading = "Formats")]

@@ -10,7 +10,8 @@ use mimu_fleet::{fleet, fleet_and_prior};
 use mimu_recording::error::Result;
 
 use crate::arguments::{JsonArgs, VerboseArgs};
-use crate::output::{Results, check_outputs, check_overwritten, progress};
+use crate::output::{Results, check_outputs, progress};
+use crate::overwriting::check_overwritten;
 use crate::report::{Made, fleet_page, fleet_text};
 
 #[derive(Args)]

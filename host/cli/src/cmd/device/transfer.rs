@@ -14,7 +14,8 @@ use mimu_recording::result_file::stage;
 
 use super::{PortArgs, open};
 use crate::arguments::JsonArgs;
-use crate::output::{check_outputs, check_overwritten, print, progress};
+use crate::output::{check_outputs, print, progress};
+use crate::overwriting::check_overwritten;
 
 #[derive(Args)]
 pub struct UploadArgs {

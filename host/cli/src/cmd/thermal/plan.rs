@@ -12,7 +12,8 @@ use mimu_thermal::basis::Shape;
 use mimu_thermal::plan::{Procedure, Request, plan, to_toml};
 
 use crate::arguments::{JsonArgs, number, range_c};
-use crate::output::{Results, check_outputs, check_overwritten};
+use crate::output::{Results, check_outputs};
+use crate::overwriting::check_overwritten;
 use crate::report;
 
 #[derive(Args)]
