@@ -46,9 +46,9 @@ fn of_clean(clean: &Clean) -> [f64; 10] {
     for (value, kind) in values.iter_mut().zip(KINDS) {
         *value = counted(clean.judged.kind == kind);
     }
-    let unobjected = |judged: &Judged| counted(judged.is_unobjected());
-    values[6] = unobjected(&clean.judged);
-    values[9] = clean.verified.as_ref().map_or(f64::NAN, unobjected);
+    values[6] = counted(clean.judged.is_unobjected());
+    let verified = clean.verified.as_ref();
+    values[9] = verified.map_or(f64::NAN, |of| counted(of.is_unobjected()));
     values
 }
 

@@ -54,12 +54,14 @@ pub use clock::{ClockRate, REFUSED_SHARE, REPORTED_SHARE, Times};
 pub use columns::{Column, Columns, RAW_COLUMNS, REFERENCE_COLUMNS};
 pub use declared::{Rails, RawUnit, Reference, WholeTurns};
 pub use growing::Growing;
+#[cfg(feature = "parquet")]
+pub use import::text_columns;
 pub use import::{
     BrokenKind, BrokenLimit, BrokenRows, Chosen, ColumnList, CommentSigns, CopiedTable, Decimal,
     Face, ImportOptions, ImportSummary, Inputs, Instance, Jitter, LogOptions, Offset, PerColumn,
     PoseMean, PoseMeans, Preset, PresetUse, Preview, ReadingUnits, ReplacedTriad, Role, Rounds,
     RowFilter, RowRange, Scale, SkippedLines, TimeSummary, TwosComplement, Zero, import, is_log,
-    labelled, log_formats, look, preview, text_columns,
+    labelled, log_formats, look, preview,
 };
 pub use in_memory::{InMemory, usual_rate_hz};
 pub use manifest::{Format, MANIFEST_FILE, Manifest, Source};

@@ -35,23 +35,61 @@ enum Kept {
 use Kept::{Axes, Bias, Gains, Matrix, Nothing, Rotated, RotatedMatrix, Whole};
 
 /// Format, its options, unit of the readings, what it keeps of gyro and accelerometer, and the largest error in SI: of rounding, or of single precision.
+type Case = (
+    &'static str,
+    &'static [&'static str],
+    &'static str,
+    [Kept; 2],
+    f64,
+);
+
 #[rustfmt::skip]
-const CASES: [(&str, &[&str], &str, [Kept; 2], f64); 24] = [
+const CASES: [Case; 24] = [
     ("c", &[], "count", [Whole, Whole], 1e-6),
     ("rust", &[], "count", [Whole, Whole], 1e-6),
     ("core", &[], "count", [Whole, Whole], 1e-6),
     ("json", &[], "SI", [Whole, Whole], 1e-14),
     ("kalibr", &[], "SI", [RotatedMatrix, RotatedMatrix], 1e-8),
-    ("kalibr", &["--result"], "SI", [RotatedMatrix, RotatedMatrix], 1e-8),
+    (
+        "kalibr",
+        &["--result"],
+        "SI",
+        [RotatedMatrix, RotatedMatrix],
+        1e-8,
+    ),
     ("openvins", &[], "SI", [Matrix, Matrix], 1e-8),
-    ("openvins", &["--model", "rpng"], "SI", [Matrix, Matrix], 1e-8),
+    (
+        "openvins",
+        &["--model", "rpng"],
+        "SI",
+        [Matrix, Matrix],
+        1e-8,
+    ),
     ("imu-calib", &[], "SI", [Nothing, Whole], 1e-8),
     ("dlio", &[], "SI", [Bias, Whole], 1e-8),
-    ("imu-tk", &["--sensor", "accel"], "count", [Nothing, Whole], 1e-9),
-    ("imu-tk", &["--sensor", "gyro"], "count", [Whole, Nothing], 1e-9),
+    (
+        "imu-tk",
+        &["--sensor", "accel"],
+        "count",
+        [Nothing, Whole],
+        1e-9,
+    ),
+    (
+        "imu-tk",
+        &["--sensor", "gyro"],
+        "count",
+        [Whole, Nothing],
+        1e-9,
+    ),
     ("fusion", &[], "count", [Whole, Whole], 1e-5),
     ("realsense", &[], "SI", [Whole, Whole], 1e-5),
-    ("realsense", &["--layout", "json"], "SI", [Whole, Whole], 1e-12),
+    (
+        "realsense",
+        &["--layout", "json"],
+        "SI",
+        [Whole, Whole],
+        1e-12,
+    ),
     ("depthai", &[], "SI", [Whole, Whole], 1e-12),
     ("basalt", &[], "SI", [Rotated, Rotated], 1e-12),
     ("matlab", &[], "SI", [Whole, Whole], 1e-12),
@@ -65,7 +103,7 @@ const CASES: [(&str, &[&str], &str, [Kept; 2], f64); 24] = [
 ];
 /// Likewise.
 #[rustfmt::skip]
-const MORE: [(&str, &[&str], &str, [Kept; 2], f64); 5] = [
+const MORE: [Case; 5] = [
     ("slimenrf", &[], "SI", [Gains, Nothing], 1e-5),
     ("pigeon", &[], "SI", [Gains, Nothing], 1e-5),
     ("iio", &[], "SI", [Bias, Bias], 1e-8),

@@ -52,6 +52,7 @@ mod summary;
 mod table;
 #[cfg(all(test, feature = "parquet"))]
 mod tests;
+#[cfg(feature = "parquet")]
 mod text_columns;
 mod time;
 mod unit_names;
@@ -77,6 +78,7 @@ pub use reading_units::ReadingUnits;
 pub use row_filter::RowFilter;
 pub use row_range::RowRange;
 pub use summary::{ImportSummary, SkippedLines};
+#[cfg(feature = "parquet")]
 pub use text_columns::text_columns;
 pub use time::{Jitter, Rounds, TimeSummary};
 
