@@ -3,4 +3,7 @@
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 venv=$("$here/../environment.sh")
+case " $* " in
+*" nightly "*) "$venv/bin/pip" install --quiet --disable-pip-version-check -r "$here/engines.txt" >&2 ;;
+esac
 exec "$venv/bin/python" -m pytest -q -p no:cacheprovider -m "not nightly" "$here" "$@"

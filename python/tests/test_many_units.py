@@ -223,7 +223,7 @@ for task in range(tasks):
 """
 
 
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", [pytest.param(name, marks=[pytest.mark.nightly] if name in ("ray", "spark") else []) for name in ENGINES])
 def test_an_engine_whose_worker_is_killed_fits_everything_once(engine: str, recordings: pa.Table, results: pa.Table, tmp_path: Path) -> None:
     for package in ENGINES[engine]:
         if importlib.util.find_spec(package) is None:
