@@ -87,7 +87,7 @@ fn the_noise_of_orb_slam3() {
     );
 }
 
-/// TixiaoShan/LIO-SAM, config/params.yaml, as of a version for ROS 2 (041f4e63, BSD-3-Clause).
+/// TixiaoShan/LIO-SAM, config/params.yaml with the parameters of ROS 2 (BSD-3-Clause).
 #[test]
 fn the_noise_of_lio_sam_for_ros2() {
     let text = "/**:\n  ros__parameters:\n\n    # IMU Settings\n    imuAccNoise: 3.9939570888238808e-03\n    imuGyrNoise: 1.5636343949698187e-03\n    \
@@ -163,7 +163,7 @@ fn the_biases_of_basalt_for_euroc() {
     assert!((gyro.matrix - nalgebra::Matrix3::identity()).amax() < 1e-15);
 }
 
-/// betaflight: a line of `diff all` of an F722 (betaflight/betaflight, issue 15027, GPL-3.0), codes of 1/2048 g.
+/// Lines of `diff all` of an F722 as owners post them, codes of 1/2048 g.
 #[test]
 fn the_codes_of_betaflight() {
     let text = "# Betaflight / STM32F7X2 (F722) 2025.12.2\nboard_name IFLIGHT_F722_TWING\nfeature GPS\n#set acc_calibration = 0,0,0,0\n\
