@@ -289,7 +289,7 @@ impl Fitting<'_> {
             ));
         }
         if kind == TriadKind::Accel {
-            triad.lever_arm_mm = arm(&relation);
+            triad.lever_arm_mm = arm_of(&relation, same_body::ARM);
         }
         Ok(triad)
     }
@@ -338,9 +338,9 @@ fn axes_alike() -> Judgement {
     judge::undetermined("two of its axes read the same")
 }
 
-/// The lever arm of an accelerometer.
-fn arm(relation: &Relation) -> Known<[Estimate; 3]> {
-    let arm = [0, 1, 2].map(|i| same_body::ARM + i);
+/// The lever arm of an accelerometer, whose parameters begin at `first`.
+fn arm_of(relation: &Relation, first: usize) -> Known<[Estimate; 3]> {
+    let arm = [0, 1, 2].map(|i| first + i);
     if relation.at.len() <= arm[2] {
         return Err("without a gyro no rate is known".into());
     }

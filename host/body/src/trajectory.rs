@@ -10,22 +10,20 @@ use mimu::calibration::of_fit::{FIGURE_DIGITS, triad_table};
 use mimu::calibration::{Calibration, Judged, TriadTable};
 use mimu::in_use::Trajectory;
 use mimu::quantity::{PerSensor, Sensor, rounded};
-use mimu::triad::{Covariance, Estimate, Part, Triad, half_width_95, vector};
+use mimu::triad::{Covariance, Estimate, Triad, affine, vector};
 use mimu_core::compensation::Affine;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{RawUnit, Recording};
-use nalgebra::{DVector, Matrix3, Rotation3, SMatrix, Vector3};
+use nalgebra::{DVector, Rotation3, SMatrix, SVector};
 use serde::Serialize;
 
-use crate::Body;
 use crate::carrier::{first, read};
-use crate::clustered::Solution;
-use crate::errors::Errors;
-use crate::fitted::{self, FittedTriad};
-use crate::judge;
+use crate::fitted::FittedTriad;
+use crate::relation::{DELAY, Relation};
 use crate::result::EstimateResult;
 use crate::series::Series;
-use compared::{ARM, ARM_M, CLOCK, Compared, DELAY, Free, TILT, TURN_S, Up};
+use crate::{Body, TriadVerification, arm_of, judge};
+use compared::{ARM, CLOCK, Compared, TILT, TURN_S, Up};
 use poses::Poses;
 
 /// A gyro and an accelerometer by a trajectory.
@@ -95,65 +93,11 @@ const UPS: [(&str, usize, f64); 6] = [
     ("-x", 0, -1.0),
 ];
 
-/// An arm is given if the data narrow what is known beforehand to this share of it.
-const DETERMINED: f64 = 0.1;
-
-/// A triad against the poses.
-struct Found {
-    at: DVector<f64>,
-    solution: Solution,
-    errors: Errors,
-    left_out: Vec<[f64; 2]>,
-    signal: f64,
-    /// White noise of an attitude, rad, or of a position, m.
-    pose_noise: f64,
-}
-
-impl Found {
-    fn of(compared: &Compared, start: DVector<f64>, free: Free) -> Option<Self> {
-        let (at, solution, used) = compared.settle(start, free)?;
-        let (squares, noise) = compared.errors(&at, &used);
-        let mut errors = Errors::of(&squares, noise.variance)?;
-        errors.held_out_rms *= solution.unseen(&used);
-        Some(Self {
-            errors,
-            left_out: compared.left_out(&at, &used),
-            signal: compared.signal(),
-            pose_noise: noise.pose,
-            at,
-            solution,
-        })
-    }
-
-    fn part(&self) -> Part {
-        Part {
-            covariance: self
-                .solution
-                .covariance
-                .fixed_view::<12, 12>(0, 0)
-                .into_owned(),
-            dof: self.solution.dof,
-            known: 0.0,
-        }
-    }
-
-    fn estimate(&self, k: usize, scale: f64) -> Estimate {
-        let variance = self.solution.covariance[(k, k)].max(0.0) * scale * scale;
-        Estimate {
-            value: self.at[k] * scale,
-            sigma: variance.sqrt(),
-            interval: half_width_95([(variance, self.solution.dof)].into_iter()),
-        }
-    }
-}
-
-fn model(at: &DVector<f64>) -> Affine<f64> {
-    mimu::triad::affine(&at.fixed_rows::<12>(0).into_owned())
-}
-
 /// The gyro beside the poses: as their quaternions read, or reversed if they fit so by far better.
 struct Turns {
     poses: Poses,
+    /// How much later the recording's times are, s, and C and o.
+    later_s: f64,
     start: DVector<f64>,
     reversed: bool,
 }
@@ -175,7 +119,7 @@ impl Turns {
                 "check that both are of one motion, and where the recording begins in the trajectory",
             )
         })?;
-        let start = |poses: &Poses| Compared::new(raw, poses, None)?.start_of_turns(delay);
+        let start = |poses: &Poses| Compared::new(raw, poses, None, delay)?.start_of_turns();
         let turned = Poses::of(trajectory, true);
         let [a, b] = [&as_read, &turned].map(start);
         let (reversed, poses, found) = match (a, b) {
@@ -191,6 +135,7 @@ impl Turns {
         };
         Ok(Self {
             poses,
+            later_s: delay,
             start: found.0,
             reversed,
         })
@@ -208,9 +153,9 @@ impl ByTrajectory {
             Error::new(&recording.place, "there is no gyro", remedy)
         })?;
         let turns = Turns::of(trajectory, &gyro)?;
-        let compared = Compared::new(&gyro, &turns.poses, None);
-        let found = compared.and_then(|c| Found::of(&c, turns.start.clone(), Free::All));
-        let found = found.ok_or_else(|| {
+        let compared = Compared::new(&gyro, &turns.poses, None, turns.later_s);
+        let found = compared.and_then(|c| Some((c.solved(turns.start.clone())?, c.signal())));
+        let ((found, noise), signal) = found.ok_or_else(|| {
             let problem = "the body turns too little for a gyro's scale factors";
             Error::new(
                 &trajectory.place,
@@ -218,29 +163,7 @@ impl ByTrajectory {
                 "turn it about all three axes, by half a turn and more",
             )
         })?;
-        let mut all = Self::alone(turns.reversed, &found);
-        let accel = all.accelerometer(recording, &turns.poses, &found)?;
-        let gyro = fitted::placed(&model(&found.at), &[found.part()]);
-        let gyro = gyro.map(|own| match accel {
-            // In the frame of the accelerometer.
-            Some(rotation) => (in_frame(&found, &rotation), rotation),
-            None => (Some(own.triad), own.rotation),
-        });
-        match gyro {
-            Some((Some(triad), rotation)) => all
-                .body
-                .triads
-                .insert(0, all.triad(Sensor::Gyro, &found, triad, rotation, None)),
-            _ => all.body.refused.push((
-                first(Sensor::Gyro),
-                judge::undetermined("two of its axes read the same"),
-            )),
-        }
-        Ok(all)
-    }
-
-    fn alone(reversed: bool, found: &Found) -> Self {
-        Self {
+        let mut all = Self {
             body: Body {
                 triads: Vec::new(),
                 refused: Vec::new(),
@@ -248,121 +171,62 @@ impl ByTrajectory {
             clock_ppm: found.estimate(CLOCK, 1e6),
             tilt_deg: None,
             up: None,
-            reversed,
-            attitude_noise_deg: found.pose_noise.to_degrees(),
+            reversed: turns.reversed,
+            attitude_noise_deg: noise.to_degrees(),
             position_noise_mm: None,
+        };
+        all.accelerometer(recording, &turns.poses, &found)?;
+        match fitted(Sensor::Gyro, &found, signal) {
+            Some(mut gyro) => {
+                if let Some(accel) = all.body.triads.first()
+                    && let Some(triad) = in_frame(&found, &accel.rotation)
+                {
+                    (gyro.triad, gyro.rotation) = (triad, accel.rotation);
+                    gyro.rotation_deg = accel.rotation_deg;
+                }
+                all.body.triads.insert(0, gyro);
+            }
+            None => all.body.refused.push((
+                first(Sensor::Gyro),
+                judge::undetermined("two of its axes read the same"),
+            )),
         }
+        Ok(all)
     }
 
-    /// Adds the accelerometer; its rotation to the frame of the trajectory.
+    /// Adds the accelerometer.
     fn accelerometer(
         &mut self,
         recording: &Recording,
         poses: &Poses,
-        gyro: &Found,
-    ) -> Result<Option<Rotation3<f64>>> {
+        gyro: &Relation,
+    ) -> Result<()> {
         let Some(raw) = read_first(recording, Sensor::Accel)? else {
-            return Ok(None);
+            return Ok(());
         };
         let name = first(Sensor::Accel);
         if poses.position.is_none() {
             let why = "the trajectory has attitudes alone, and an accelerometer is compared with its positions";
             self.body.refused.push((name, judge::undetermined(why)));
-            return Ok(None);
+            return Ok(());
         }
         let gravity = recording.manifest.gravity_mps2;
-        let begun = UPS.iter().filter_map(|(up, axis, sign)| {
-            let compared = Compared::new(&raw, poses, Some(Up::axis(*axis, *sign, gravity)))?;
-            let (start, squares) = compared.start_of_forces(gyro.at[DELAY], gyro.at[CLOCK])?;
-            Some((*up, compared, start, squares))
+        let found = upright(&raw, poses, gravity, gyro).and_then(|(up, compared, start)| {
+            let (relation, noise) = compared.solved(start)?;
+            let mut triad = fitted(Sensor::Accel, &relation, compared.signal())?;
+            triad.lever_arm_mm = arm_of(&relation, ARM);
+            Some((up, relation, noise, triad))
         });
-        let best = begun.min_by(|a, b| a.3.total_cmp(&b.3));
-        let found = best.and_then(|(up, compared, start, _)| {
-            Some((up, Found::of(&compared, start, Free::All)?))
-        });
-        let placed = found.and_then(|(up, found)| {
-            let placed = fitted::placed(&model(&found.at), &[found.part()])?;
-            Some((up, found, placed))
-        });
-        let Some((up, found, placed)) = placed else {
+        let Some((up, relation, noise, triad)) = found else {
             let why = "its scale factors and angles are not determined: bring each axis up, down and in between";
             self.body.refused.push((name, judge::undetermined(why)));
-            return Ok(None);
+            return Ok(());
         };
         self.up = Some(up);
-        self.position_noise_mm = Some(1e3 * found.pose_noise);
-        self.tilt_deg = Some([TILT, TILT + 1].map(|k| found.estimate(k, 1f64.to_degrees())));
-        let rotation = placed.rotation;
-        let triad = self.triad(
-            Sensor::Accel,
-            &found,
-            placed.triad,
-            rotation,
-            Some(placed.rotation_deg),
-        );
+        self.position_noise_mm = Some(1e3 * noise);
+        self.tilt_deg = Some([TILT, TILT + 1].map(|k| relation.estimate(k, 1f64.to_degrees())));
         self.body.triads.push(triad);
-        Ok(Some(rotation))
-    }
-
-    fn triad(
-        &self,
-        sensor: Sensor,
-        found: &Found,
-        triad: Triad,
-        rotation: Rotation3<f64>,
-        rotation_deg: Option<[Estimate; 3]>,
-    ) -> FittedTriad {
-        let weights = &found.solution.by_weights;
-        let share = |k: usize| weights[(k, k)].sqrt() / ARM_M;
-        let arm = match sensor {
-            Sensor::Gyro => Err("a gyro reads the same everywhere on a body".to_string()),
-            Sensor::Accel if (ARM..ARM + 3).map(share).fold(0.0, f64::max) < DETERMINED => {
-                // The point of the trajectory is what the arm begins at.
-                Ok([0, 1, 2].map(|i| found.estimate(ARM + i, 1e3)))
-            }
-            Sensor::Accel => Err(
-                "the body turns too slowly to show a lever arm: turn it faster, about two axes"
-                    .to_string(),
-            ),
-        };
-        let degree = 1f64.to_degrees();
-        let rotation_deg = rotation_deg
-            .or_else(|| self.body.triads.first().map(|accel| accel.rotation_deg))
-            .or_else(|| Some(fitted::placed(&model(&found.at), &[found.part()])?.rotation_deg))
-            .unwrap_or_else(|| {
-                let value = rotation.scaled_axis() * degree;
-                [0, 1, 2].map(|i| Estimate {
-                    value: value[i],
-                    sigma: f64::NAN,
-                    interval: f64::NAN,
-                })
-            });
-        FittedTriad {
-            name: first(sensor),
-            reference: None,
-            unit: sensor.unit(),
-            judgement: judge::same_body(
-                &found.errors,
-                found.signal,
-                "the trajectory",
-                sensor.unit(),
-            ),
-            triad,
-            rotation,
-            rotation_deg,
-            delay_ms: Ok(found.estimate(DELAY, 1e3)),
-            lever_arm_mm: arm,
-            dip_deg: None,
-            rms: found.errors.rms,
-            held_out_rms: found.errors.held_out_rms,
-            noise_floor: found.errors.noise_floor,
-            window_s: match sensor {
-                Sensor::Gyro => TURN_S,
-                Sensor::Accel => compared::FORCE_S,
-            },
-            windows: found.errors.windows,
-            left_out: found.left_out.clone(),
-        }
+        Ok(())
     }
 
     /// The tables of a calibration file.
@@ -409,6 +273,39 @@ fn condition(covariance: &Covariance) -> f64 {
     rounded((eigen.max() / eigen.min()).sqrt(), 5)
 }
 
+/// A triad by its relation to the poses.
+fn fitted(sensor: Sensor, relation: &Relation, signal: f64) -> Option<FittedTriad> {
+    let window_s = match sensor {
+        Sensor::Gyro => TURN_S,
+        Sensor::Accel => compared::FORCE_S,
+    };
+    let unit = sensor.unit();
+    let judgement = judge::same_body(&relation.errors, signal, "the trajectory", unit);
+    let parts = (relation, Vec::new());
+    let of = FittedTriad::of(first(sensor), parts, (unit, window_s), judgement)?;
+    Some(FittedTriad {
+        reference: None,
+        ..of
+    })
+}
+
+/// An accelerometer beside the poses with the axis that points up, by which it fits best, and its first parameters.
+fn upright<'a>(
+    raw: &'a Series,
+    poses: &'a Poses,
+    gravity: f64,
+    gyro: &Relation,
+) -> Option<(&'static str, Compared<'a>, DVector<f64>)> {
+    let begun = UPS.iter().filter_map(|(up, axis, sign)| {
+        let up_by = Up::axis(*axis, *sign, gravity);
+        let compared = Compared::new(raw, poses, Some(up_by), gyro.at[DELAY])?;
+        let (start, squares) = compared.start_of_forces(gyro.at[CLOCK])?;
+        Some((*up, compared, start, squares))
+    });
+    let best = begun.min_by(|a, b| a.3.total_cmp(&b.3));
+    best.map(|(up, compared, start, _)| (up, compared, start))
+}
+
 fn read_first(recording: &Recording, sensor: Sensor) -> Result<Option<Series>> {
     match recording.triads().contains(&first(sensor)) {
         true => Ok(Some(read(recording, first(sensor))?)),
@@ -417,24 +314,21 @@ fn read_first(recording: &Recording, sensor: Sensor) -> Result<Option<Series>> {
 }
 
 /// The gyro in a frame that `rotation` takes to that of the trajectory.
-fn in_frame(found: &Found, rotation: &Rotation3<f64>) -> Option<Triad> {
+fn in_frame(found: &Relation, rotation: &Rotation3<f64>) -> Option<Triad> {
     let back = rotation.inverse();
-    let of = model(&found.at);
-    let mut by = SMatrix::<f64, 12, 12>::zeros();
-    for k in 0..12 {
-        let mut one = SMatrix::<f64, 12, 1>::zeros();
-        one[k] = 1.0;
-        let moved = mimu::triad::affine(&one);
-        by.set_column(
-            k,
-            &vector(&(back.matrix() * moved.matrix), &(back * moved.offset)),
-        );
-    }
-    let inverse = Affine {
+    let turned = |of: &Affine<f64>| Affine {
         matrix: back.matrix() * of.matrix,
         offset: back * of.offset,
     };
-    Triad::from_inverse(inverse, vec![found.part().seen_by(&by)])
+    let mut by = SMatrix::<f64, 12, 12>::zeros();
+    for k in 0..12 {
+        let moved = turned(&affine(&SVector::ith(k, 1.0)));
+        by.set_column(k, &vector(&moved.matrix, &moved.offset));
+    }
+    Triad::from_inverse(
+        turned(&found.calibration()),
+        vec![found.part().seen_by(&by)],
+    )
 }
 
 /// Errors of a calibration against the trajectory of another recording: the scale factors and the angles between the axes are those of the file; where the instrument sees the body, clock,
@@ -446,65 +340,46 @@ pub fn verify(
     recording: &Recording,
     trajectory: &Trajectory,
     calibration: &Calibration,
-) -> Result<PerSensor<Option<crate::TriadVerification>>> {
+) -> Result<PerSensor<Option<TriadVerification>>> {
     let gyro = read_first(recording, Sensor::Gyro)?.ok_or_else(|| {
         let remedy = "a trajectory is found in time by the rates: record the gyro too";
         Error::new(&recording.place, "there is no gyro", remedy)
     })?;
     let turns = Turns::of(trajectory, &gyro)?;
     let mut all = PerSensor::from_fn(|_| None);
-    let turned = Compared::new(&gyro, &turns.poses, None);
-    let by_turns = turned.and_then(|c| {
-        let start = turned_to(&turns.start, &calibration.inverse(Sensor::Gyro)?);
-        Found::of(&c, start, Free::Mounting)
+    let by_turns = calibration.inverse(Sensor::Gyro).and_then(|own| {
+        let compared = Compared::new(&gyro, &turns.poses, None, turns.later_s)?;
+        judged(compared, &turns.start, &own)
     });
-    let Some(by_turns) = by_turns else {
+    let Some((by_turns, signal)) = by_turns else {
         return Ok(all);
     };
+    all.gyro = Some(verification(&by_turns, signal, Sensor::Gyro));
     let accel = match &turns.poses.position {
         Some(_) => read_first(recording, Sensor::Accel)?,
         None => None,
     };
     if let Some((raw, own)) = accel.zip(calibration.inverse(Sensor::Accel)) {
         let gravity = recording.manifest.gravity_mps2;
-        let begun = UPS.iter().filter_map(|(_, axis, sign)| {
-            let compared =
-                Compared::new(&raw, &turns.poses, Some(Up::axis(*axis, *sign, gravity)))?;
-            let (start, squares) =
-                compared.start_of_forces(by_turns.at[DELAY], by_turns.at[CLOCK])?;
-            Some((compared, start, squares))
-        });
-        let best = begun.min_by(|a, b| a.2.total_cmp(&b.2));
-        let found =
-            best.and_then(|(c, start, _)| Found::of(&c, turned_to(&start, &own), Free::Mounting));
-        all.accel = found.map(|found| verification(&found, Sensor::Accel));
+        let beside = upright(&raw, &turns.poses, gravity, &by_turns);
+        let found = beside.and_then(|(_, compared, start)| judged(compared, &start, &own));
+        all.accel = found.map(|(found, signal)| verification(&found, signal, Sensor::Accel));
     }
-    all.gyro = Some(verification(&by_turns, Sensor::Gyro));
     Ok(all)
 }
 
-fn verification(found: &Found, sensor: Sensor) -> crate::TriadVerification {
-    crate::TriadVerification {
+/// The relation of a calibration that is judged to the poses, and the signal.
+fn judged(of: Compared, start: &DVector<f64>, own: &Affine<f64>) -> Option<(Relation, f64)> {
+    let (compared, start) = of.judging(start, &own.matrix);
+    Some((compared.solved(start)?.0, compared.signal()))
+}
+
+fn verification(found: &Relation, signal: f64, sensor: Sensor) -> TriadVerification {
+    TriadVerification {
         rms: found.errors.held_out_rms,
         noise_floor: found.errors.noise_floor,
         unit: sensor.unit().into(),
         windows: found.errors.windows,
-        judgement: judge::same_body(&found.errors, found.signal, "the trajectory", sensor.unit()),
+        judgement: judge::same_body(&found.errors, signal, "the trajectory", sensor.unit()),
     }
-}
-
-/// Parameters with this calibration, turned as is nearest to what `at` has.
-fn turned_to(at: &DVector<f64>, own: &Affine<f64>) -> DVector<f64> {
-    let free = model(at).matrix;
-    let across: Matrix3<f64> = own
-        .matrix
-        .try_inverse()
-        .map_or(free, |forward| free * forward);
-    let rotation = Rotation3::from_matrix(&across);
-    let offset: Vector3<f64> = model(at).offset;
-    let mut turned = at.clone();
-    turned
-        .fixed_rows_mut::<12>(0)
-        .copy_from(&vector(&(rotation.matrix() * own.matrix), &offset));
-    turned
 }

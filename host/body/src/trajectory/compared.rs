@@ -3,13 +3,16 @@
 //! A turn between two poses is that of the integrated rates; the second difference of three positions is the specific force that was turned into the frame of the
 //! reference, less gravity, weighted by a triangle over the window. Nothing is differentiated: the ends of the windows are poses as they were measured.
 
-use nalgebra::{DMatrix, DVector, Matrix3, UnitQuaternion, Vector3};
+use mimu::triad::{affine, vector};
+use mimu_core::compensation::Affine;
+use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 use super::poses::Poses;
-use crate::clustered::{Clusters, Solution};
+use crate::clustered::Clusters;
+use crate::errors::Errors;
 use crate::pieces::{Groups, Pieces};
+use crate::relation::{DELAY, Equations, Relation};
 use crate::series::Series;
-use mimu::triad::{affine, vector};
 
 /// Length of a turn, s, and of each half of a window of positions. The noise of attitudes is that of two stamps, so that longer turns know a rate better.
 pub(super) const TURN_S: f64 = 1.0;
@@ -22,7 +25,6 @@ const MOVING: f64 = 0.1;
 
 /// Parameters: C by rows, o, by how much the readings are later (s), and by how much more with each second; of an accelerometer also the tilt of the frame of the
 /// reference (rad), and the arm from the point of the reference (m).
-pub(super) const DELAY: usize = 12;
 pub(super) const CLOCK: usize = 13;
 pub(super) const TILT: usize = 14;
 pub(super) const ARM: usize = 16;
@@ -30,12 +32,7 @@ pub(super) const ARM: usize = 16;
 const DELAY_S: f64 = 0.05;
 const CLOCK_RATE: f64 = 3e-4;
 const TILT_RAD: f64 = 0.05;
-pub(super) const ARM_M: f64 = 0.5;
-/// Most steps; the change of the delay at which they end, s, and the longest.
-const STEPS: usize = 20;
-const SETTLED_S: f64 = 1e-7;
-const LONGEST_STEP_S: f64 = 0.03;
-
+const ARM_M: f64 = 0.5;
 /// Poses at the ends of a window, and in its middle for positions.
 #[derive(Clone, Copy)]
 struct Window {
@@ -92,28 +89,18 @@ pub(super) struct Compared<'a> {
     pub poses: &'a Poses,
     /// Of an accelerometer.
     pub up: Option<Up>,
-    pub pieces: Pieces,
+    pieces: Pieces,
     windows: Vec<Window>,
     middle_s: f64,
-}
-
-/// White noise.
-pub(super) struct Noise {
-    /// Of a window, mean over the axes, SI².
-    pub variance: f64,
-    /// Of a pose, standard deviation of an axis: attitude, rad, or position, m.
-    pub pose: f64,
-}
-
-/// What may move: all of C and o, or, of a calibration that is judged, its rotation and o.
-#[derive(Clone, Copy, PartialEq)]
-pub(super) enum Free {
-    All,
-    Mounting,
+    /// How much later the readings are than the poses before anything is estimated, s: the delay is about it.
+    later_s: f64,
+    /// A calibration that is judged: in the place of C there stands the rotation vector from it, in three parameters of nine.
+    judged: Option<Matrix3<f64>>,
 }
 
 impl<'a> Compared<'a> {
-    pub fn new(raw: &'a Series, poses: &'a Poses, up: Option<Up>) -> Option<Self> {
+    /// Of readings that are later than the poses by `later_s` or so.
+    pub fn new(raw: &'a Series, poses: &'a Poses, up: Option<Up>, later_s: f64) -> Option<Self> {
         let pieces = Pieces::over(&poses.t)?;
         let (length, half) = match up {
             None => (TURN_S, 0.5 * TURN_S),
@@ -126,6 +113,8 @@ impl<'a> Compared<'a> {
             windows: Vec::new(),
             middle_s: 0.5 * (poses.t[0] + poses.t[poses.t.len() - 1]),
             pieces,
+            later_s,
+            judged: None,
         };
         all.windows = all.cut(length, half);
         Some(all)
@@ -172,14 +161,50 @@ impl<'a> Compared<'a> {
         self.up.map_or(TILT, |_| ARM + 3)
     }
 
-    /// C and o, and the rms residual, with a delay, by plain least squares over short turns.
-    pub fn start_of_turns(&self, delay_s: f64) -> Option<(DVector<f64>, f64)> {
+    /// The same with the C of a calibration that is judged, turned as is nearest to what `at` has; and its parameters.
+    pub fn judging(self, at: &DVector<f64>, own: &Matrix3<f64>) -> (Self, DVector<f64>) {
+        let across = own
+            .try_inverse()
+            .map(|forward| self.model(at).matrix * forward);
+        let rotation = across.map_or(Rotation3::identity(), |of| Rotation3::from_matrix(&of));
+        let mut turned = at.clone();
+        turned.rows_mut(0, 9).fill(0.0);
+        let judged = Some(rotation.matrix() * own);
+        (Self { judged, ..self }, turned)
+    }
+
+    /// C and o at these parameters.
+    fn model(&self, at: &DVector<f64>) -> Affine<f64> {
+        let mut model = affine(&at.fixed_rows::<12>(0).into_owned());
+        if let Some(own) = &self.judged {
+            let turned = Rotation3::new(at.fixed_rows::<3>(0).into_owned());
+            model.matrix = turned.matrix() * own;
+        }
+        model
+    }
+
+    /// Derivatives by C as those by the rotation of a calibration that is judged.
+    fn freed(&self, by: &mut DMatrix<f64>, model: &Affine<f64>) {
+        if self.judged.is_some() {
+            let turns = [0, 1, 2].map(|k| {
+                let turned = Vector3::<f64>::ith(k, 1.0).cross_matrix() * model.matrix;
+                by.columns(0, 9) * vector(&turned, &Vector3::zeros()).fixed_rows::<9>(0)
+            });
+            by.columns_mut(0, 9).fill(0.0);
+            for (k, turn) in turns.iter().enumerate() {
+                by.set_column(k, turn);
+            }
+        }
+    }
+
+    /// C and o, and the rms residual, by plain least squares over short turns.
+    pub fn start_of_turns(&self) -> Option<(DVector<f64>, f64)> {
         let mut normal = DMatrix::<f64>::zeros(4, 4);
         let mut right = DMatrix::<f64>::zeros(4, 3);
         let (mut squares, mut count) = (0.0, 0.0);
         for window in self.cut(SHORT_S, 0.5 * SHORT_S) {
             let [a, b] = [window.from, window.to].map(|k| self.poses.t[k]);
-            let Some(nodes) = self.raw.between(a + delay_s, b + delay_s) else {
+            let Some(nodes) = self.raw.between(a + self.later_s, b + self.later_s) else {
                 continue;
             };
             let sums = nodes
@@ -201,42 +226,39 @@ impl<'a> Compared<'a> {
             }
             at[9 + axis] = found[(3, axis)];
         }
-        at[DELAY] = delay_s;
         Some((at, ((squares - found.dot(&right)).max(0.0) / count).sqrt()))
     }
 
-    /// C and o of an accelerometer, and the sum of squares, by plain least squares, with the delay of the gyro.
-    pub fn start_of_forces(&self, delay_s: f64, clock: f64) -> Option<(DVector<f64>, f64)> {
+    /// C and o of an accelerometer, and the mean square of its errors, by plain least squares, with the clock of the gyro.
+    pub fn start_of_forces(&self, clock: f64) -> Option<(DVector<f64>, f64)> {
         let mut at = DVector::zeros(self.parameters());
-        (at[DELAY], at[CLOCK]) = (delay_s, clock);
-        let solution = self.clusters(
-            &at,
-            &mut Groups::default(),
-            &vec![true; self.pieces.count],
-            Free::All,
-        );
-        at += &solution.solve(&vec![true; self.pieces.count])?.step;
-        (at[DELAY], at[CLOCK]) = (delay_s, clock);
-        let (errors, _) = self.errors(&at, &vec![true; self.pieces.count]);
-        Some((at, errors.iter().sum::<f64>() / errors.len() as f64))
+        at[CLOCK] = clock;
+        let all = vec![true; self.pieces.count];
+        let sums = self.clusters(&at, &mut Groups::default(), &all);
+        at += &sums.solve(&all)?.step;
+        (at[DELAY], at[CLOCK]) = (0.0, clock);
+        let (squares, _) = self.squares(&at, &all);
+        Some((at, squares.iter().sum::<f64>() / squares.len() as f64))
     }
 
     /// How much later the readings are than the poses at a time of these.
     fn lag(&self, at: &DVector<f64>, t: f64) -> f64 {
-        at[DELAY] + at[CLOCK] * (t - self.middle_s)
+        self.later_s + at[DELAY] + at[CLOCK] * (t - self.middle_s)
     }
 
     fn reckoned(&self, window: &Window, at: &DVector<f64>) -> Option<Reckoned> {
-        match self.up {
-            None => self.turn(window, at),
-            Some(up) => self.force(window, at, &up),
-        }
+        let model = self.model(at);
+        let mut reckoned = match self.up {
+            None => self.turn(window, at, &model)?,
+            Some(up) => self.force(window, at, &model, &up)?,
+        };
+        self.freed(&mut reckoned.by, &model);
+        Some(reckoned)
     }
 
-    fn turn(&self, window: &Window, at: &DVector<f64>) -> Option<Reckoned> {
+    fn turn(&self, window: &Window, at: &DVector<f64>, model: &Affine<f64>) -> Option<Reckoned> {
         let [a, b] = [window.from, window.to].map(|k| self.poses.t[k]);
         let nodes = self.raw.between(a + self.lag(at, a), b + self.lag(at, b))?;
-        let model = affine(&at.fixed_rows::<12>(0).into_owned());
         // From the end back: what turns after a step takes its error to the end.
         let mut after = UnitQuaternion::identity();
         let mut by_reading = [Matrix3::<f64>::zeros(); 4];
@@ -292,7 +314,13 @@ impl<'a> Compared<'a> {
         Some(sums.map(|sum| sum / (0.5 * (b - a))))
     }
 
-    fn force(&self, window: &Window, at: &DVector<f64>, up: &Up) -> Option<Reckoned> {
+    fn force(
+        &self,
+        window: &Window,
+        at: &DVector<f64>,
+        model: &Affine<f64>,
+        up: &Up,
+    ) -> Option<Reckoned> {
         let poses = [window.from, window.middle, window.to];
         let [a, m, b] = poses.map(|k| self.poses.t[k]);
         let lag = self.lag(at, m);
@@ -312,7 +340,7 @@ impl<'a> Compared<'a> {
         let (fall, by_tilt) = up.fall([at[TILT], at[TILT + 1]]);
         let mut by = DMatrix::zeros(3, self.parameters());
         fill(&mut by, &by_reading);
-        let model = at.fixed_rows::<12>(0).into_owned();
+        let model = vector(&model.matrix, &model.offset);
         let arm: Vector3<f64> = at.fixed_rows::<3>(ARM).into_owned();
         let reckoned = by.columns(0, 12) * model + fall - turned * arm;
         // Readings half a sample later and earlier.
@@ -335,161 +363,64 @@ impl<'a> Compared<'a> {
         })
     }
 
-    /// Steps until delay and weights stand still, and leaves out pieces that the rest contradicts; the parameters, the last solution, and which pieces are used.
-    pub fn settle(
-        &self,
-        mut at: DVector<f64>,
-        free: Free,
-    ) -> Option<(DVector<f64>, Solution, Vec<bool>)> {
-        let mut groups = Groups::default();
-        let mut used = vec![true; self.pieces.count];
-        for round in 0..4 {
-            let mut last = None;
-            for _ in 0..STEPS {
-                let solution = self.clusters(&at, &mut groups, &used, free).solve(&used)?;
-                let mut step = self.map(&at, free) * &solution.step;
-                let longest = step[DELAY].abs() / LONGEST_STEP_S;
-                if longest > 1.0 {
-                    step /= longest;
-                }
-                let is_settled = step[DELAY].abs() < SETTLED_S && groups.are_settled();
-                self.step(&mut at, &step, &solution.step, free);
-                last = Some(solution);
-                if is_settled {
-                    break;
-                }
-            }
-            let solution = last?;
-            let next = self.pieces.kept(&solution.held_out);
-            if round == 3 || next == used {
-                let covariance = self.by_attitude(&at, &mut groups, &used, free, &solution);
-                return Some((
-                    at,
-                    Solution {
-                        covariance,
-                        ..solution
-                    },
-                    used,
-                ));
-            }
-            used = next;
-        }
-        None
-    }
-
-    /// The covariance by leaving out one attitude after the other, if it is the larger: an instrument errs by where it sees its markers, alike whenever the body is turned so.
-    fn by_attitude(
-        &self,
-        at: &DVector<f64>,
-        groups: &mut Groups,
-        used: &[bool],
-        free: Free,
-        by_time: &Solution,
-    ) -> DMatrix<f64> {
-        let cells = self.windows.iter().map(|w| w.cell).max().unwrap_or(0) + 1;
-        let own = self.windows.iter().filter(|w| used[w.piece]);
-        let clusters = self.sums(at, groups, free, own.map(|w| (w, w.cell, true)), cells);
-        let Some(other) = clusters.solve(&vec![true; cells]) else {
-            return by_time.covariance.clone();
-        };
+    /// The relation of the readings to the poses from `at` on, with the delay as a whole, and the noise of a pose. Its covariance is that by leaving out pieces of time or, if that is
+    /// larger, attitudes: an instrument errs by where it sees its markers, alike whenever the body is turned so.
+    pub fn solved(&self, at: DVector<f64>) -> Option<(Relation, f64)> {
+        let mut relation = Relation::of(self, at)?;
+        let Relation {
+            at, groups, used, ..
+        } = &mut relation;
+        let cells = self.windows.iter().map(|w| w.cell).max()? + 1;
+        let mut sums = Clusters::new(cells, at, &self.known());
+        let in_use = |w: &Window| used[w.piece].then_some(w.cell);
+        self.add_windows(&mut sums, at, groups, |w| Some((in_use(w)?, true)));
+        let by_time = &relation.solution;
         let size = |of: &DMatrix<f64>| {
-            (0..of.nrows())
-                .map(|k| of[(k, k)] / by_time.by_weights[(k, k)])
-                .sum::<f64>()
+            let each = (0..of.nrows()).map(|k| of[(k, k)] / by_time.by_weights[(k, k)]);
+            each.sum::<f64>()
         };
-        match size(&other.covariance) > size(&by_time.covariance) {
-            true => other.covariance,
-            false => by_time.covariance.clone(),
-        }
+        let by_attitude = sums.solve(&vec![true; cells]).map(|of| of.covariance);
+        let by_attitude = by_attitude.filter(|of| size(of) > size(&by_time.covariance));
+        let (_, pose_noise) = self.squares(&relation.at, &relation.used);
+        let spans = relation.left_out.iter();
+        let lag = |t: f64| t + self.lag(&relation.at, t);
+        relation.left_out = spans.map(|span| span.map(lag)).collect();
+        relation.solution.covariance = by_attitude.unwrap_or(relation.solution.covariance);
+        relation.at[DELAY] += self.later_s;
+        Some((relation, pose_noise))
     }
 
-    /// Derivatives of all parameters by those that are free.
-    fn map(&self, at: &DVector<f64>, free: Free) -> DMatrix<f64> {
-        let n = self.parameters();
-        if free == Free::All {
-            return DMatrix::identity(n, n);
-        }
-        let model = affine(&at.fixed_rows::<12>(0).into_owned());
-        let mut map = DMatrix::zeros(n, n - 6);
-        for k in 0..3 {
-            let turned = Vector3::<f64>::ith(k, 1.0).cross_matrix() * model.matrix;
-            map.fixed_view_mut::<12, 1>(0, k)
-                .copy_from(&vector(&turned, &Vector3::zeros()));
-        }
-        for k in 9..n {
-            map[(k, k - 6)] = 1.0;
-        }
-        map
-    }
-
-    /// Takes a step; a rotation stays one.
-    fn step(&self, at: &mut DVector<f64>, step: &DVector<f64>, own: &DVector<f64>, free: Free) {
-        let before = affine(&at.fixed_rows::<12>(0).into_owned());
-        *at += step;
-        if free == Free::Mounting {
-            let share = step[DELAY] / own[6];
-            let share = if share.is_finite() { share } else { 1.0 };
-            let turn = UnitQuaternion::from_scaled_axis(own.fixed_rows::<3>(0) * share);
-            let matrix = turn.to_rotation_matrix() * before.matrix;
-            let offset = at.fixed_rows::<3>(9).into_owned();
-            at.fixed_rows_mut::<12>(0)
-                .copy_from(&vector(&matrix, &offset));
-        }
-    }
-
-    fn clusters(
+    /// Adds the windows for which `cluster` gives a number, and whether their residuals count for the scatter.
+    fn add_windows(
         &self,
+        sums: &mut Clusters,
         at: &DVector<f64>,
         groups: &mut Groups,
-        used: &[bool],
-        free: Free,
-    ) -> Clusters {
-        let own = self.windows.iter().map(|w| (w, w.piece, used[w.piece]));
-        self.sums(at, groups, free, own, self.pieces.count)
-    }
-
-    /// Normal equations of windows, each with the number of its cluster of so many, and whether its residual counts for the scatter.
-    fn sums<'w>(
-        &self,
-        at: &DVector<f64>,
-        groups: &mut Groups,
-        free: Free,
-        windows: impl Iterator<Item = (&'w Window, usize, bool)>,
-        clusters: usize,
-    ) -> Clusters {
-        let map = self.map(at, free);
-        let mut known = DVector::repeat(self.parameters(), f64::INFINITY);
-        (known[DELAY], known[CLOCK]) = (DELAY_S, CLOCK_RATE);
-        for k in TILT..self.parameters() {
-            known[k] = if k < ARM { TILT_RAD } else { ARM_M };
-        }
-        let skipped = self.parameters() - map.ncols();
-        let own = |of: &DVector<f64>| of.rows(skipped, map.ncols()).into_owned();
-        // What is known of the delay is known around what the search found.
-        let mut beyond = at.clone();
-        beyond[DELAY] = 0.0;
-        let mut clusters = Clusters::new(clusters, &own(&beyond), &own(&known));
-        groups.begin();
-        for (window, cluster, counts) in windows {
+        cluster: impl Fn(&Window) -> Option<(usize, bool)>,
+    ) {
+        for window in &self.windows {
+            let Some((cluster, counts)) = cluster(window) else {
+                continue;
+            };
             let Some(Reckoned { residual, by }) = self.reckoned(window, at) else {
                 continue;
             };
-            let by = by * &map;
             let group = usize::from(window.moves);
             if counts {
                 groups.count(group, residual.norm_squared(), 3.0);
             }
             let weight = groups.weight(group);
             for axis in 0..3 {
-                clusters.add(cluster, residual[axis], &by.row(axis).transpose(), weight);
+                sums.add(cluster, residual[axis], &by.row(axis).transpose(), weight);
             }
         }
-        groups.end();
-        clusters
     }
 
-    /// Mean squares of the residuals of each window, SI², and what white noise of poses and readings makes of them.
-    pub fn errors(&self, at: &DVector<f64>, used: &[bool]) -> (Vec<f64>, Noise) {
+    /// Mean squares of the residuals of each window, SI², and the white noise of a pose: attitude, rad, or position, m, standard deviation of an axis.
+    ///
+    /// The noise is how much more the residual of a window has in common with itself than with that of the next: errors that last cancel. The noise of a pose is in two turns with opposite
+    /// signs, and in three second differences as 1, -2, 1. That of the readings counts as if it were of the poses: it is small beside theirs, and is not known from motion.
+    fn squares(&self, at: &DVector<f64>, used: &[bool]) -> (Vec<f64>, f64) {
         let mut squares = Vec::new();
         let (mut next, mut pairs) = (0.0, 0.0);
         let mut last: Option<(usize, Vector3<f64>)> = None;
@@ -516,31 +447,12 @@ impl<'a> Compared<'a> {
             squares.push(residual.norm_squared() / 3.0);
         }
         let mean = squares.iter().sum::<f64>() / squares.len() as f64;
-        let noise = self.noise(mean - next / f64::max(pairs, 1.0));
-        (squares, noise)
-    }
-
-    /// White noise of the poses, by how much more the residual of a window has in common with itself than with that of the next: errors that last cancel. The noise of a pose
-    /// is in two turns with opposite signs, and in three second differences as 1, -2, 1. That of the readings counts as if it were of the poses: it is small beside theirs, and a
-    /// reading's noise at rest is not known from motion.
-    fn noise(&self, more: f64) -> Noise {
-        let (scale, parts, kept) = match self.up {
-            None => (TURN_S, 3.0, 2.0),
-            Some(_) => (HALF_S.powi(2), 10.0, 6.0),
+        let more = (mean - next / f64::max(pairs, 1.0)).max(0.0);
+        let (parts, scale) = match self.up {
+            None => (3.0, TURN_S),
+            Some(_) => (10.0, HALF_S.powi(2)),
         };
-        let pose = more.max(0.0) / parts;
-        Noise {
-            variance: kept * pose,
-            pose: pose.sqrt() * scale,
-        }
-    }
-
-    /// Times of the pieces that are not used, by the clock of the recording, s.
-    pub fn left_out(&self, at: &DVector<f64>, used: &[bool]) -> Vec<[f64; 2]> {
-        let spans = self.pieces.spans(used).into_iter();
-        spans
-            .map(|span| span.map(|t| t + self.lag(at, t)))
-            .collect()
+        (squares, (more / parts).sqrt() * scale)
     }
 
     /// Rms of what is compared, of an axis, SI: the rate of turns, or the specific force.
@@ -556,6 +468,44 @@ impl<'a> Compared<'a> {
                     .sqrt()
             }
         }
+    }
+}
+
+impl Equations for Compared<'_> {
+    fn known(&self) -> DVector<f64> {
+        let mut known = DVector::repeat(self.parameters(), f64::INFINITY);
+        if self.judged.is_some() {
+            known.rows_mut(3, 6).fill(1.0);
+        }
+        (known[DELAY], known[CLOCK]) = (DELAY_S, CLOCK_RATE);
+        for k in TILT..self.parameters() {
+            known[k] = if k < ARM { TILT_RAD } else { ARM_M };
+        }
+        known
+    }
+
+    fn pieces(&self) -> &Pieces {
+        &self.pieces
+    }
+
+    fn add_to(
+        &self,
+        clusters: &mut Clusters,
+        at: &DVector<f64>,
+        groups: &mut Groups,
+        used: &[bool],
+    ) {
+        let piece = |w: &Window| Some((w.piece, used[w.piece]));
+        self.add_windows(clusters, at, groups, piece);
+    }
+
+    fn errors(&self, at: &DVector<f64>, used: &[bool]) -> Option<Errors> {
+        let (squares, pose) = self.squares(at, used);
+        let (kept, scale) = match self.up {
+            None => (2.0, TURN_S),
+            Some(_) => (6.0, HALF_S.powi(2)),
+        };
+        Errors::of(&squares, kept * (pose / scale).powi(2))
     }
 }
 
