@@ -34,6 +34,7 @@ class Unit:
     def export(self, form, *arguments, name=None):
         """Exports to `name`; returns the path and the result as JSON."""
         path = self.folder / (name or f"export-{form}")
+        path.unlink(missing_ok=True)
         out = run("export", form, "--calibration", "cal.toml", "-o", path, "--json", "-", *arguments, cwd=self.folder)
         return path, json.loads(out)
 

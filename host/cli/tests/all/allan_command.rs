@@ -484,7 +484,7 @@ fn one_noise_file_serves_all(folder: &Path) {
     for command in [kalibr, design] {
         done(folder, &format!("{command} --noise both.toml"));
         let error = refused(folder, &format!("{command} --noise raw.toml"));
-        let says = "its unit is V, not";
+        let says = "its unit is V";
         assert!(
             error.contains(says) && error.contains("--calibration"),
             "{error}"
