@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use mimu::diagnose::Recordings;
 use mimu::diagnosed::{Diagnosed, diagnosed};
-use mimu_cli::called::{DiagnoseArgs, of_contents};
+use mimu_cli::called::{DiagnoseArgs, Further, of_contents};
 use mimu_cli::report::{self, Detail, Made, fragment};
 use mimu_recording::error::Result;
 use pyo3::prelude::*;
@@ -20,6 +20,7 @@ use crate::work::{done, json};
 #[pyclass(frozen, module = "mimu._mimu")]
 pub(crate) struct Diagnosis {
     done: Diagnosed,
+    further: Further,
     created: String,
 }
 
@@ -27,7 +28,7 @@ pub(crate) struct Diagnosis {
 impl Diagnosis {
     /// JSON of the result, as `mimu diagnose --json` writes it.
     fn json(&self) -> PyResult<String> {
-        json(&self.done.result)
+        json(&self.further.json(&self.done.result))
     }
 
     /// The text that `mimu diagnose` prints; with `everything`, that of `--all --next`.
@@ -36,7 +37,7 @@ impl Diagnosis {
             all: everything,
             next: everything,
         };
-        report::diagnosis_text(&self.done.result, detail)
+        report::diagnosis_text(&self.done.result, detail) + &self.further.text()
     }
 
     /// The content of the page, as a fragment of HTML.
@@ -74,6 +75,7 @@ pub(crate) fn diagnose(
     noise: Option<&Noise>,
 ) -> PyResult<Diagnosis> {
     let all = sources(py, &recordings)?;
+    let first = all[0].clone();
     let second = verify.map(|recording| recording.source.clone());
     let given = calibration.map(|c| (c.model.clone(), c.name.clone()));
     let noise = noise.map(|noise| noise.file.clone());
@@ -95,13 +97,15 @@ pub(crate) fn diagnose(
             given: given.as_ref().map(|(model, _)| model.as_ref()),
         };
         let given = given.as_ref().map(|(_, name)| name.as_str());
-        Ok(diagnosed(
-            recordings,
-            [name.as_deref(), given],
-            &now,
-            &|_| (),
-        )?)
+        let found = diagnosed(recordings, [name.as_deref(), given], &now, &|_| ())?;
+        let samples = first.samples()?;
+        let further = Further::of(Some(&**samples), &found.diagnosis.before, None)?;
+        Ok((found, further))
     };
-    let done = done(py, work, refused)?;
-    Ok(Diagnosis { done, created })
+    let (done, further) = done(py, work, refused)?;
+    Ok(Diagnosis {
+        done,
+        further,
+        created,
+    })
 }

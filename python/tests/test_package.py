@@ -28,15 +28,17 @@ def test_the_command_is_there_with_its_help_and_status() -> None:
 
 #: Options about files that are written, and about what is printed.
 OF_FILES = {"json", "strict", "verbose", "replace", "force"}
+#: A trajectory is a file beside the recording.
+BESIDE = {"trajectory", "trajectory_zero"}
 
 
 @pytest.mark.parametrize(
     ("function", "subcommand", "elsewhere"),
     [
         # The objects, and destinations of the result.
-        (mimu.fit, "fit", OF_FILES | {"class", "dwells", "o"}),
-        (mimu.fit_sessions, "fit", OF_FILES | {"class", "dwells", "o", "only", "keep", "prior", "whole_turns", "placement", "reference_error", "part"}),
-        (mimu.verify, "verify", OF_FILES),
+        (mimu.fit, "fit", OF_FILES | BESIDE | {"class", "dwells", "o"}),
+        (mimu.fit_sessions, "fit", OF_FILES | BESIDE | {"class", "dwells", "o", "only", "keep", "prior", "whole_turns", "placement", "reference_error", "part"}),
+        (mimu.verify, "verify", OF_FILES | BESIDE),
         (mimu.diagnose, "diagnose", OF_FILES | {"o", "page", "plan", "next"}),
         (mimu.allan, "allan", OF_FILES | {"from", "to", "plot", "o"}),
         (mimu.noise_in_use, "noise", OF_FILES | {"o"}),

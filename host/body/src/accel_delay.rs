@@ -23,12 +23,14 @@ const LONGEST_S: f64 = 8.0;
 const FEWEST: usize = 8;
 /// Step of the derivative by the delay, s.
 const STEP_S: f64 = 1e-3;
+/// A delay is there beyond so many times its interval: one in ten thousand units without one would have it.
+const THERE: f64 = 2.0;
 /// Gauss-Newton steps: the third changes a delay of 20 ms by less than a microsecond.
 const STEPS: usize = 5;
 /// A turn whose velocity is off by this many times the median of all is left out.
 const CONTRADICTED: f64 = 5.0;
 
-/// By how much the accelerometer's readings are later than the gyro's, ms, by the turns between the rests of `fit`. `None` if they are too few, or one of the two is not calibrated.
+/// By how much the accelerometer's readings are later than the gyro's, ms, by the turns between the rests of `fit`. `None` if they show none, are too few, or one of the two is not calibrated.
 ///
 /// # Errors
 /// The samples cannot be read.
@@ -37,7 +39,8 @@ pub fn accel_delay_ms(recording: &Recording, fit: &Fit) -> Result<Option<Estimat
     let models = PerSensor::from_fn(|sensor| Some(unit.triads[sensor].as_ref()?.inverse));
     let carrier = Carrier::read(recording, &models)?;
     let both = carrier.motion().zip(carrier.reference(Sensor::Accel));
-    Ok(both.and_then(|(motion, accel)| delay_ms(motion, accel.series, &unit.rests)))
+    let found = both.and_then(|(motion, accel)| delay_ms(motion, accel.series, &unit.rests));
+    Ok(found.filter(|delay| delay.value.abs() > THERE * delay.interval))
 }
 
 fn delay_ms(motion: &Motion, force: &Series, rests: &[Rest]) -> Option<Estimate> {

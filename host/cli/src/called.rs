@@ -16,7 +16,7 @@ use crate::Cli;
 pub use crate::cmd::allan::AllanArgs;
 use crate::cmd::design::DesignArgs;
 pub use crate::cmd::design::Designed;
-pub use crate::cmd::diagnose::DiagnoseArgs;
+pub use crate::cmd::diagnose::{DiagnoseArgs, Further};
 pub use crate::cmd::fit::{FitArgs, FitMade, Open, SessionsMade};
 pub use crate::cmd::noise::NoiseInUseArgs;
 pub use crate::cmd::thermal::FitArgs as ThermalFitArgs;

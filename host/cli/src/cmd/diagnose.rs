@@ -8,18 +8,20 @@ use crate::report::{self, Made};
 use clap::Args;
 use mimu::diagnose::Recordings;
 use mimu::diagnosed::{Diagnosed, diagnosed};
-use mimu::fit::{Options as FitOptions, fit};
+use mimu::fit::{Fit, Options as FitOptions, fit};
 use mimu::noise::noise_file::NoiseFile;
 use mimu::plan::next_experiment;
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
 use mimu::recording_problem::OfRecording;
+use mimu::result::diagnosis::DiagnosisResult;
 use mimu::signal::stillness::DwellSearch;
 use mimu::triad::Estimate;
 use mimu_body::result::EstimateResult;
 use mimu_body::{Body, Options, Pairs, Split, accel_delay_ms};
 use mimu_recording::Recording;
 use mimu_recording::error::Result;
+use serde::Serialize;
 use serde_json::{Value, json};
 
 use crate::arguments::{
@@ -126,18 +128,43 @@ fn write_plan(args: &DiagnoseArgs, done: &Diagnosed, out: &mut Results) -> Resul
     Ok(())
 }
 
-/// Whether a delay is there. At twice its interval one in ten thousand units without a delay would have one.
-fn is_found(delay: &Estimate) -> bool {
-    delay.value.abs() > 2.0 * delay.interval
+/// What a body and a delay add to a diagnosis.
+pub struct Further {
+    /// What all pairs err by, and each.
+    split: Option<Split>,
+    /// Of the accelerometer against the gyro, ms.
+    delay_ms: Option<Estimate>,
 }
 
-/// What a body and a delay add to the result as JSON.
-fn further(split: Option<Split>, delay: Option<Estimate>) -> Option<Value> {
-    let mut more = serde_json::Map::new();
-    more.extend(split.map(|split| ("body".to_owned(), json!(split))));
-    let delay = delay.map(EstimateResult::from);
-    more.extend(delay.map(|delay| ("accel_delay_ms".to_owned(), json!(delay))));
-    (!more.is_empty()).then_some(Value::Object(more))
+impl Further {
+    /// Of the samples whose fit is `before`.
+    ///
+    /// # Errors
+    /// They cannot be read.
+    pub fn of(samples: Option<&Recording>, before: &Fit, split: Option<Split>) -> Result<Self> {
+        let delay_ms = samples.map(|samples| accel_delay_ms(samples, before));
+        Ok(Self {
+            split,
+            delay_ms: delay_ms.transpose()?.flatten(),
+        })
+    }
+
+    /// As text, after that of the diagnosis.
+    pub fn text(&self) -> String {
+        let delay = self.delay_ms.as_ref().map(report::delay_text);
+        let split = self.split.as_ref().map(report::split_text);
+        delay.into_iter().chain(split).collect()
+    }
+
+    /// The diagnosis with it, as JSON.
+    pub fn json<'a>(&self, found: &'a DiagnosisResult) -> impl Serialize + use<'a> {
+        let mut more = serde_json::Map::new();
+        more.extend(self.split.as_ref().map(|of| ("body".to_owned(), json!(of))));
+        let delay = self.delay_ms.map(EstimateResult::from);
+        more.extend(delay.map(|of| ("accel_delay_ms".to_owned(), json!(of))));
+        let more = (!more.is_empty()).then_some(Value::Object(more));
+        Joined::of(found, more.as_ref())
+    }
 }
 
 /// The pairs of the recording with these `samples`, if it has several. With a given calibration no pair is fitted.
@@ -218,15 +245,9 @@ pub fn run(args: &DiagnoseArgs, command_line: &str) -> Result<Status> {
         .as_ref()
         .map(|of| Body::of(of, before, &Options::default()));
     let body = body.transpose()?.flatten();
-    let delay = samples.map(|samples| accel_delay_ms(&samples, before));
-    let delay = delay.transpose()?.flatten().filter(is_found);
-    let mut out = Results::new(report::diagnosis_text(found, detail));
-    if let Some(delay) = &delay {
-        out.say(&report::delay_text(delay));
-    }
-    if let Some(pairs) = &pairs {
-        out.say(&report::split_text(&pairs.split));
-    }
+    let split = pairs.map(|pairs| pairs.split);
+    let further = Further::of(samples.as_ref(), before, split)?;
+    let mut out = Results::new(report::diagnosis_text(found, detail) + &further.text());
     let place = diagnosis.before.prepared.place.clone();
     let refusal = args.writing.refusal(&found.judgement, &place, MISFIT);
     let output = args.output.as_ref().filter(|_| refusal.is_none());
@@ -241,8 +262,7 @@ pub fn run(args: &DiagnoseArgs, command_line: &str) -> Result<Status> {
         let made = Made::of(&args.recordings, command_line);
         Ok(report::diagnosis_page(found, &made))
     })?;
-    let more = further(pairs.map(|pairs| pairs.split), delay);
-    out.print(&args.json, &Joined::of(found, more.as_ref()))?;
+    out.print(&args.json, &further.json(found))?;
     match refusal {
         Some(error) => Err(error),
         None => Ok(args.strict.status(&found.judgement)),
