@@ -99,7 +99,7 @@ pub(crate) fn diagnose(
         let given = given.as_ref().map(|(_, name)| name.as_str());
         let found = diagnosed(recordings, [name.as_deref(), given], &now, &|_| ())?;
         let samples = first.samples()?;
-        let further = Further::of(Some(&**samples), &found.diagnosis.before, None)?;
+        let further = Further::of(Some(&**samples), &found, None)?;
         Ok((found, further))
     };
     let (done, further) = done(py, work, refused)?;

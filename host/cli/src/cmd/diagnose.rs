@@ -8,7 +8,7 @@ use crate::report::{self, Made};
 use clap::Args;
 use mimu::diagnose::Recordings;
 use mimu::diagnosed::{Diagnosed, diagnosed};
-use mimu::fit::{Fit, Options as FitOptions, fit};
+use mimu::fit::{Options as FitOptions, fit};
 use mimu::noise::noise_file::NoiseFile;
 use mimu::plan::next_experiment;
 use mimu::prepared::Prepared;
@@ -137,12 +137,13 @@ pub struct Further {
 }
 
 impl Further {
-    /// Of the samples whose fit is `before`.
+    /// Of the samples that were diagnosed. Beside an effect of the sensors a delay would follow it.
     ///
     /// # Errors
     /// They cannot be read.
-    pub fn of(samples: Option<&Recording>, before: &Fit, split: Option<Split>) -> Result<Self> {
-        let delay_ms = samples.map(|samples| accel_delay_ms(samples, before));
+    pub fn of(samples: Option<&Recording>, done: &Diagnosed, split: Option<Split>) -> Result<Self> {
+        let samples = samples.filter(|_| done.result.effects.is_empty());
+        let delay_ms = samples.map(|samples| accel_delay_ms(samples, &done.diagnosis.before));
         Ok(Self {
             split,
             delay_ms: delay_ms.transpose()?.flatten(),
@@ -246,7 +247,7 @@ pub fn run(args: &DiagnoseArgs, command_line: &str) -> Result<Status> {
         .map(|of| Body::of(of, before, &Options::default()));
     let body = body.transpose()?.flatten();
     let split = pairs.map(|pairs| pairs.split);
-    let further = Further::of(samples.as_ref(), before, split)?;
+    let further = Further::of(samples.as_ref(), &done, split)?;
     let mut out = Results::new(report::diagnosis_text(found, detail) + &further.text());
     let place = diagnosis.before.prepared.place.clone();
     let refusal = args.writing.refusal(&found.judgement, &place, MISFIT);
