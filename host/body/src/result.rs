@@ -156,7 +156,7 @@ impl TriadResult {
             ),
             (ParameterKind::Bias, physical.bias, raw_unit(raw, of.unit)),
         ];
-        // A further triad has a frame of its own axes; a gyro by a trajectory is in that of the accelerometer.
+        // The axes of a further triad define its frame; a gyro by a trajectory has the accelerometer's frame.
         let by_frame = match of.reference {
             Some(_) => None,
             None => Some((

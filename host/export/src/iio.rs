@@ -72,7 +72,7 @@ impl Target for Iio {
         export.formula("output = scale * raw + calibbias on each axis of the chip, SI; the chip adds calibbias");
         export.leaves(calibration, Places::Axes);
         let mut body = String::new();
-        let missing = "its calibbias stays as it is";
+        let missing = "its calibbias stays unchanged";
         for (entry, parts) in biases::<Self>(options, from, missing, &mut export)? {
             let sensor = entry.sensor;
             let argument = match sensor {

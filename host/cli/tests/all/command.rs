@@ -103,3 +103,17 @@ pub fn says(text: &str, words: &[&str]) {
         assert!(text.contains(word), "{word:?} is not in: {text}");
     }
 }
+
+/// Imports the example, a recording by hand of a unit with readings in counts (tests/example), as `counts`, and fits it to `counts.toml`.
+pub fn example(folder: &Path) {
+    let example = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/example");
+    for name in ["accel.txt", "gyro.txt"] {
+        std::fs::copy(example.join(name), folder.join(name)).unwrap();
+    }
+    done(
+        folder,
+        "import accel.txt gyro.txt --columns t_s,accel_x,accel_y,accel_z --columns t_s,gyro_x,gyro_y,gyro_z --raw-unit count \
+         --gravity 9.80665 -o counts",
+    );
+    done(folder, "fit counts -o counts.toml");
+}

@@ -1,8 +1,6 @@
 //! The first minutes of a user: a log in, a file out, and what the command says when something is given in the wrong place.
 
-use std::path::PathBuf;
-
-use super::command::{done, mimu, refused};
+use super::command::{done, example, mimu, refused};
 use crate::command::says;
 
 fn json(text: &str) -> serde_json::Value {
@@ -13,16 +11,7 @@ fn json(text: &str) -> serde_json::Value {
 fn log() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    let example = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../tests/example");
-    for name in ["accel.txt", "gyro.txt"] {
-        std::fs::copy(example.join(name), at.join(name)).unwrap();
-    }
-    done(
-        at,
-        "import accel.txt gyro.txt --columns t_s,accel_x,accel_y,accel_z --columns t_s,gyro_x,gyro_y,gyro_z --raw-unit count \
-         --gravity 9.80665 -o counts",
-    );
-    done(at, "fit counts -o counts.toml");
+    example(at);
     done(
         at,
         "apply counts --calibration counts.toml --format csv -o clean",

@@ -1,24 +1,13 @@
 //! Calibrations of other programs, judged by a recording of their unit. The recording is by hand, of a unit with readings in counts (tests/example).
 
-use std::path::PathBuf;
-
-use super::command::{done, json, mimu, refused};
+use super::command::{done, example, json, mimu, refused};
 use crate::command::says;
 
-/// A folder with the recording `counts`, and its calibration `cal.toml`.
+/// A folder with the recording `counts`, and its calibration `counts.toml`.
 fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    let example = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../tests/example");
-    for name in ["accel.txt", "gyro.txt"] {
-        std::fs::copy(example.join(name), at.join(name)).unwrap();
-    }
-    done(
-        at,
-        "import accel.txt gyro.txt --columns t_s,accel_x,accel_y,accel_z --columns t_s,gyro_x,gyro_y,gyro_z --raw-unit count \
-         --gravity 9.80665 -o counts",
-    );
-    done(at, "fit counts -o cal.toml");
+    example(at);
     folder
 }
 
@@ -26,9 +15,9 @@ fn folder() -> tempfile::TempDir {
 fn a_transposed_matrix_is_named_and_undone() {
     let folder = folder();
     let at = folder.path();
-    let own = json(at, "verify counts --calibration cal.toml");
+    let own = json(at, "verify counts --calibration counts.toml");
     assert!(own.get("conventions").is_none());
-    done(at, "export c cal.toml -o cal.h");
+    done(at, "export c counts.toml -o cal.h");
     let header = std::fs::read_to_string(at.join("cal.h")).unwrap();
     let (before, rest) = header.split_once("mimu_gyro_C[3][3] = {").unwrap();
     let (matrix, after) = rest.split_once("};").unwrap();
@@ -66,10 +55,10 @@ fn a_transposed_matrix_is_named_and_undone() {
 fn a_calibration_goes_through_formats_and_comes_back() {
     let folder = folder();
     let at = folder.path();
-    done(at, "convert cal.toml --to fusion -o cal.h");
+    done(at, "convert counts.toml --to fusion -o cal.h");
     done(at, "convert cal.h --to core -o cal.bin");
     done(at, "convert cal.bin --to mimu -o back.toml");
-    let [own, back] = ["cal.toml", "back.toml"]
+    let [own, back] = ["counts.toml", "back.toml"]
         .map(|file| json(at, &format!("verify counts --calibration {file}")));
     for sensor in ["gyro", "accel"] {
         let [a, b] = [&own, &back].map(|v| v["sensors"][sensor]["rms"].as_f64().unwrap());
@@ -113,6 +102,6 @@ fn a_calibration_goes_through_formats_and_comes_back() {
     assert!(refused(at, "apply counts --calibration vins.yaml -o out").contains("no calibration"));
     // A calibration of another program is taken elsewhere too.
     done(at, "apply counts --calibration cal.h -o clean");
-    done(at, "compare cal.toml cal.h");
+    done(at, "compare counts.toml cal.h");
     done(at, "report counts --calibration cal.h -o unit.html");
 }

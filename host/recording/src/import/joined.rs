@@ -148,7 +148,7 @@ impl Files {
         self.others.iter().chain([&self.first])
     }
 
-    /// What is to be left out, because it is no reading in one of the files.
+    /// What to leave out: columns that measure nothing in one of the files.
     pub fn to_leave_out(&self) -> LeftOut {
         let any = |is: &dyn Fn(&Source) -> bool| self.all().any(is);
         let zeros = |fault| any(&|file| file.seen.zero_temperatures() == Some(fault));

@@ -108,7 +108,7 @@ fn of_file(options: &ImportOptions, step: usize, path: &Path) -> ImportOptions {
     one
 }
 
-/// What is no reading: a thermometer that answers in none of the files, zeros of it in any. Refuses a sensor that was not connected.
+/// Columns that measure nothing: a thermometer that never answers in any file, and its zeros. Refuses a sensor that was not connected.
 fn left_out<'a>(files: impl Iterator<Item = &'a Files>) -> Result<LeftOut> {
     let mut all = LeftOut {
         thermometer: true,

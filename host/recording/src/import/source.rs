@@ -188,7 +188,7 @@ struct Wanted {
     conversion: Conversion,
 }
 
-/// A foreign file, or a part of one with a clock of its own.
+/// A foreign file, or a part of one that has a separate clock.
 #[derive(Debug)]
 pub(super) struct Source {
     pub path: PathBuf,
@@ -320,7 +320,7 @@ impl Source {
             .unwrap_or(self.columns.len())
     }
 
-    /// Whether it has readings of further triads alone. Its rows then fill cells of the recording, and decide about none of its rows.
+    /// Whether it has readings of further triads alone. Its rows then fill cells of the recording, and add and remove no rows.
     pub fn is_further(&self) -> bool {
         !self.columns.is_empty() && self.first_further() == 0
     }

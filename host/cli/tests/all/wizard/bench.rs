@@ -122,6 +122,7 @@ impl Bench {
             if child.try_wait().unwrap().is_some() {
                 return false;
             }
+            // Only a session that hangs waits so long: without an end the tests would never tell.
             assert!(
                 since.elapsed() < Duration::from_secs(1800),
                 "no {event}:\n{text}"

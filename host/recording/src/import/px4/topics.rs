@@ -3,7 +3,7 @@
 use px4_ulog::stream_parser::ParseableFieldType;
 use px4_ulog::stream_parser::model::DataMessage;
 
-/// Fields of a topic with readings; none of one whose messages are those of a FIFO.
+/// A topic with readings and its fields. A topic of a FIFO lists no field: its messages are batches.
 pub(super) struct TopicFields {
     pub name: &'static str,
     fields: &'static [&'static str],
