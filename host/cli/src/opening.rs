@@ -1,6 +1,6 @@
 //! Opens calibrations: files of mimu, and those of other programs, which state no uncertainty.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use mimu::calibration::Calibration;
 use mimu_export::foreign::{self, Foreign};
@@ -28,6 +28,25 @@ pub(crate) fn open(path: &Path) -> Result<Opened> {
         Some(other) => Opened::Foreign(Box::new(other)),
         None => Opened::Own(Box::new(Calibration::read(path)?)),
     })
+}
+
+/// Opens what these files have of one unit: IMU-TK writes one of each triad.
+pub(crate) fn open_all(paths: &[PathBuf]) -> Result<Opened> {
+    let mut all = paths.iter().map(|path| open(path));
+    let none = || Error::new("calibration", "no file is given", "give one");
+    let mut opened = all.next().ok_or_else(none)??;
+    for (next, path) in all.zip(&paths[1..]) {
+        opened = match (opened, next?) {
+            (Opened::Foreign(before), Opened::Foreign(next)) => {
+                Opened::Foreign(Box::new(before.with_triad_of(*next)?))
+            }
+            _ => {
+                let problem = "this or the file before it is a calibration file of mimu, which has both triads";
+                return Err(Error::new(path.display(), problem, "give that file alone"));
+            }
+        };
+    }
+    Ok(opened)
 }
 
 /// The calibration at `path`, of readings in counts if the file does not say their unit.

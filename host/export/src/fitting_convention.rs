@@ -4,15 +4,19 @@
 //! reading of the file's numbers becomes a calibration, which [`verify`] judges by the recording. A reading other than the format's own counts only if the
 //! format's errs significantly more ([`SensorVerification::exceeds`]). If several fit alike, the simplest is taken, and the others are named.
 
+use std::ops::RangeInclusive;
+
 use mimu::calibration::Calibration;
 use mimu::calibration::verify::{SensorVerification, verify};
+use mimu::judge::errors::UNEXPLAINED_SHARE;
+use mimu::known_size;
 use mimu::prepared::Prepared;
-use mimu::quantity::{AXES, PerSensor, Sensor, plural};
+use mimu::quantity::{self, AXES, PerSensor, Sensor, plural};
 use mimu::readable::{self, STANDARD_GRAVITY};
 use mimu_allan::model::Term;
 use mimu_core::compensation::Affine;
-use mimu_recording::RawUnit;
 use mimu_recording::error::Result;
+use mimu_recording::{RawUnit, Reference};
 use nalgebra::{Matrix3, Vector3};
 use serde::Serialize;
 
@@ -24,6 +28,11 @@ use crate::layout::nothing;
 const STEPS: usize = 10;
 /// Two readings whose numbers differ by less, relative to the largest, are one.
 const SAME: f64 = 1e-9;
+/// A wrong convention multiplies the error by more: where the matrix is transposed, 0.127 deg become 51. A file whose numbers are wrong errs alike however it is
+/// read, and the least of so many errors says nothing.
+const WRONG_READING: f64 = 2.0;
+/// Gravity on Earth, m/s², from Huascarán to the Arctic Ocean (9.764 to 9.834), and the standard constant of a program anywhere.
+const ON_EARTH: RangeInclusive<f64> = 9.75..=9.85;
 
 /// How the numbers of one triad were read.
 #[derive(Debug, Clone, Serialize)]
@@ -34,6 +43,9 @@ pub struct Reading {
     pub changed: String,
     /// Other readings that the recording does not distinguish from it.
     pub alike: Vec<String>,
+    /// Number of readings that were tried, if all are misfits: the numbers are wrong, and no convention makes them right.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub none_fits_of: Option<usize>,
     /// Whether the bias is that of the recording, as the file has none.
     pub bias_of_recording: bool,
     /// Error in the convention of the format, in `unit`; null if it gives no calibration.
@@ -58,6 +70,9 @@ impl Reading {
         let (sensor, rms) = (self.sensor, show(self.rms));
         let declared = self.rms_as_declared.map_or("no error".into(), show);
         let mut text = match self.changed.as_str() {
+            _ if let Some(tried) = self.none_fits_of => {
+                format!("{sensor}: fits in no way of the {tried} that were tried, error {rms}")
+            }
             "" => format!("{sensor}: read as {format} reads it, error {rms}"),
             changed => {
                 format!("{sensor}: fits {changed}, error {rms}; as {format} reads it {declared}")
@@ -112,9 +127,15 @@ pub fn calibration(foreign: &Foreign, prepared: &Prepared) -> Result<(Calibratio
             found.sensors[sensor].clone()
         };
         let mut candidates = Vec::new();
+        let mut gravity = None;
         let mut all_readings = readings(&foreign.format.convention, &parts, sensor);
-        if foreign.parts[sensor].is_none() {
-            all_readings.truncate(1);
+        match (foreign.parts[sensor].is_some(), all_readings.first()) {
+            (true, Some((_, own))) => {
+                gravity = other_gravity(prepared, sensor, own);
+                let ranges = ranges(own);
+                all_readings.extend(ranges.into_iter().chain(gravity.clone()));
+            }
+            _ => all_readings.truncate(1),
         }
         for (changed, mut model) in all_readings {
             if !with_bias {
@@ -133,11 +154,15 @@ pub fn calibration(foreign: &Foreign, prepared: &Prepared) -> Result<(Calibratio
         };
         let fits = |c: &&Candidate| !c.2.exceeds(&best.2, gain(&c.1) / gain(&best.1));
         let mut fitting = candidates.iter().filter(fits);
-        let Some((changed, model, found)) = fitting.next() else {
+        let declared = candidates.iter().find(|c| c.0.is_empty());
+        let size = known_size(prepared, best.2.figure);
+        let most = UNEXPLAINED_SHARE * size.unwrap_or(f64::INFINITY);
+        let useless = |c: &&Candidate| best.2.rms > most && c.2.rms < WRONG_READING * best.2.rms;
+        let none_fits = declared.filter(useless);
+        let Some((changed, model, found)) = none_fits.or_else(|| fitting.next()) else {
             continue;
         };
         models[sensor] = Some(*model);
-        let declared = candidates.iter().find(|c| c.0.is_empty());
         let noise = white(prepared, sensor, model);
         let file = foreign.density(sensor, Term::N, Some(prepared.manifest.sample_rate_hz));
         if foreign.parts[sensor].is_none() && file.is_none() {
@@ -146,7 +171,19 @@ pub fn calibration(foreign: &Foreign, prepared: &Prepared) -> Result<(Calibratio
         all.push(Reading {
             sensor,
             changed: changed.clone(),
-            alike: fitting.map(|c| c.0.clone()).collect(),
+            alike: match none_fits {
+                Some(_) => Vec::new(),
+                // One more free number fits as well as none.
+                None => fitting
+                    .map(|c| c.0.clone())
+                    .filter(|way| {
+                        gravity
+                            .as_ref()
+                            .is_none_or(|(of_gravity, _)| way != of_gravity)
+                    })
+                    .collect(),
+            },
+            none_fits_of: none_fits.map(|_| candidates.len()),
             bias_of_recording: !with_bias,
             rms_as_declared: declared.map(|c| c.2.rms),
             rms: found.rms,
@@ -218,6 +255,43 @@ fn readings(convention: &Convention, parts: &Parts, sensor: Sensor) -> Vec<(Stri
         add([&axes, ""], Some(Affine { matrix, ..own }));
     }
     all
+}
+
+/// The calibration for a range of the recording that is not that of the file. A bias in the unit of the input stays.
+fn ranges(own: &Affine<f64>) -> [(String, Affine<f64>); 6] {
+    [2.0, 0.5, 4.0, 0.25, 8.0, 0.125].map(|wider| {
+        let matrix = own.matrix * wider;
+        let changed = format!("with the range of the recording {wider} times that of the file");
+        (changed, Affine { matrix, ..*own })
+    })
+}
+
+/// The calibration of an accelerometer with all scale factors changed alike, as by other gravity where it was made.
+fn other_gravity(
+    prepared: &Prepared,
+    sensor: Sensor,
+    own: &Affine<f64>,
+) -> Option<(String, Affine<f64>)> {
+    let sizes = prepared.observations(sensor).into_iter();
+    let sizes: Vec<f64> = sizes
+        .map(|o| (own.matrix * o.raw + own.offset).norm())
+        .collect();
+    // The gravity by which the relative errors are least.
+    let there = sizes.iter().map(|s| s * s).sum::<f64>() / sizes.iter().sum::<f64>();
+    if sensor == Sensor::Gyro
+        || prepared.manifest.reference != Reference::Gravity
+        || !ON_EARTH.contains(&there)
+    {
+        return None;
+    }
+    let factor = prepared.manifest.gravity_mps2 / there;
+    let percent = quantity::significant(1e2 * (1.0 / factor - 1.0).abs());
+    let side = if factor < 1.0 { "large" } else { "small" };
+    let changed = format!(
+        "if its scale factors are {percent} % too {side} alike, as with gravity taken as {there:.4} m/s² where it was made"
+    );
+    let (matrix, offset) = (own.matrix * factor, own.offset * factor);
+    Some((changed, Affine { matrix, offset }))
 }
 
 /// Factors of the matrix, with what is changed.

@@ -118,6 +118,32 @@ impl Foreign {
         })
     }
 
+    /// With the triad of another file of the same program.
+    ///
+    /// # Errors
+    /// The files are of two programs, or both have one triad.
+    pub fn with_triad_of(mut self, other: Self) -> Result<Self> {
+        let place = format!("{}, {}", self.place, other.place);
+        let refused = |problem: String| {
+            let remedy = "give files of one program, each with a triad";
+            Err(Error::new(&place, problem, remedy).about(Argument::Calibration))
+        };
+        if self.format.name != other.format.name {
+            let (first, second) = (self.format.name, other.format.name);
+            return refused(format!("one file is of {first}, the other of {second}"));
+        }
+        let both = Sensor::BOTH.map(|s| self.parts[s].is_some() && other.parts[s].is_some());
+        if self.whole.is_some() || other.whole.is_some() || both.contains(&true) {
+            return refused("both files have a calibration of one triad".into());
+        }
+        for (sensor, parts) in other.parts.present() {
+            self.parts[sensor] = Some(*parts);
+        }
+        self.raw_unit = self.raw_unit.or(other.raw_unit);
+        self.place = place;
+        Ok(self)
+    }
+
     /// What the file has that is not read.
     pub fn left_out(&self) -> Option<String> {
         let keys = self.format.not_read.iter();

@@ -249,7 +249,7 @@ pub(crate) fn rms(figure: Figure, values: impl Iterator<Item = Vector3<f64>>) ->
 }
 
 /// Size of what a figure is compared with, in its unit; `None` for inputs, which a table gives.
-pub(crate) fn known_size(prepared: &Prepared, figure: Figure) -> Option<f64> {
+pub fn known_size(prepared: &Prepared, figure: Figure) -> Option<f64> {
     match figure {
         Figure::Direction => Some(1.0),
         Figure::GravityMagnitude => Some(prepared.manifest.gravity_mps2),

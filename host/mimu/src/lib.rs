@@ -134,6 +134,7 @@ pub use effects::effect::Effect;
 pub use effects::fitted::FittedEffect;
 pub use fit::{Fit, Options, Residual, SensorFit, Split, fit, fit_biases};
 pub use judgement::{Judgement, JudgementKind};
+pub use judging::known_size;
 pub use mimu_core::PerSensor;
 pub use mimu_core::compensation::Affine;
 pub use mimu_recording::error::Error;

@@ -1,6 +1,6 @@
 //! `mimu convert`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use clap::builder::PossibleValuesParser;
@@ -13,7 +13,7 @@ use serde_json::json;
 
 use super::export::written;
 use crate::arguments::JsonArgs;
-use crate::opening::{Opened, open};
+use crate::opening::{Opened, open_all};
 use crate::output::{check_outputs, print};
 use crate::overwriting::check_overwritten;
 
@@ -22,8 +22,9 @@ const OWN: &str = "mimu";
 
 #[derive(Args)]
 pub struct ConvertArgs {
-    /// Calibration file of mimu or of another program
-    file: PathBuf,
+    /// Calibration file of mimu or of another program; or the two of a program that writes one of each triad
+    #[arg(value_name = "FILE", required = true)]
+    files: Vec<PathBuf>,
     /// Format to write: one of `mimu export`, or mimu for a calibration file
     #[arg(long, value_name = "FORMAT", value_parser = names())]
     to: String,
@@ -49,10 +50,11 @@ fn names() -> PossibleValuesParser {
 }
 
 pub fn run(args: &ConvertArgs) -> Result<()> {
-    check_outputs(&[Some(&args.out), args.json.file()], &[&args.file])?;
+    let inputs: Vec<&Path> = args.files.iter().map(PathBuf::as_path).collect();
+    check_outputs(&[Some(&args.out), args.json.file()], &inputs)?;
     check_overwritten(&[Some(&args.out)])?;
     let format = FORMATS.iter().find(|format| format.name == args.to);
-    let opened = open(&args.file)?;
+    let opened = open_all(&args.files)?;
     let takes_noise = format.is_some_and(|format| format.noise != Noise::No);
     let noise = match &opened {
         Opened::Foreign(other) if takes_noise => other.noise(args.rate_hz)?,
@@ -72,7 +74,7 @@ pub fn run(args: &ConvertArgs) -> Result<()> {
         let remedy = format!("see mimu export {} --help", args.to);
         Error::new("options after --", problem, remedy)
     })?;
-    let place = args.file.display().to_string();
+    let place = args.files[0].display().to_string();
     let from = Sources {
         calibration: calibration.as_ref().map(|of| (of, place.as_str())),
         biases: None,

@@ -2,7 +2,7 @@
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use mimu::calibration::Calibration;
@@ -36,9 +36,9 @@ use crate::status::Status;
 pub struct VerifyArgs {
     /// Recording, of samples or of means, or a log that `mimu import` reads
     recording: PathBuf,
-    /// Calibration file, mimu's or another program's, whose conventions are tried on the recording
-    #[arg(long, value_name = "FILE")]
-    calibration: PathBuf,
+    /// Calibration file, mimu's or another program's, whose conventions are tried on the recording; again for the other triad of a program that writes a file of each
+    #[arg(long, value_name = "FILE", required = true)]
+    calibration: Vec<PathBuf>,
     #[command(flatten)]
     still: StillArgs,
     #[command(flatten)]
@@ -60,13 +60,14 @@ pub struct VerifyArgs {
 }
 
 pub(crate) fn run(args: &VerifyArgs) -> Result<Status> {
-    let opened = opening::open(&args.calibration)?;
+    let opened = opening::open_all(&args.calibration)?;
     let outputs = [args.json.file()];
     let log = args.log.or_gravity(opened.gravity_mps2());
-    let inputs = [Some(args.calibration.as_path()), args.noise.file.as_deref()];
+    let calibrations = args.calibration.iter().map(|path| Some(path.as_path()));
+    let inputs: Vec<Option<&Path>> = calibrations.chain([args.noise.file.as_deref()]).collect();
     if let Some(by) = args.trajectory.read()? {
         let recording = open(&args.recording, &log)?;
-        let calibration = opening::calibration(&args.calibration)?;
+        let calibration = opened.of_readings(recording.manifest.raw_unit)?;
         let (text, all, judgement) = trajectory::verified(&recording, &by, &calibration)?;
         print(&args.json, &text, &all, None)?;
         return Ok(args.strict.status(&judgement));

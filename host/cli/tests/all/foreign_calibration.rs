@@ -105,3 +105,41 @@ fn a_calibration_goes_through_formats_and_comes_back() {
     done(at, "compare counts.toml cal.h");
     done(at, "report counts --calibration cal.h -o unit.html");
 }
+
+/// IMU-TK writes a file of each triad. A gyro is judged with the accelerometer's.
+#[test]
+fn two_files_of_a_triad_each_are_one_calibration() {
+    let folder = folder();
+    let at = folder.path();
+    for sensor in ["accel", "gyro"] {
+        let options = format!("--calibration counts.toml --sensor {sensor}");
+        done(at, &format!("export imu-tk {options} -o {sensor}.calib"));
+    }
+    let both = "verify counts --calibration accel.calib --calibration gyro.calib";
+    let [own, found] = ["verify counts --calibration counts.toml", both].map(|of| json(at, of));
+    done(at, "convert gyro.calib accel.calib --to mimu -o cal.toml");
+    let converted = json(at, "verify counts --calibration cal.toml");
+    for sensor in ["gyro", "accel"] {
+        let rms = |of: &serde_json::Value| of["sensors"][sensor]["rms"].as_f64().unwrap();
+        for read in [&found, &converted] {
+            let ratio = rms(read) / rms(&own);
+            assert!((ratio - 1.0).abs() < 1e-3, "{sensor}: {ratio}");
+        }
+    }
+    let error = refused(at, "verify counts --calibration gyro.calib");
+    says(
+        &error,
+        &["the calibration has no accelerometer", "(--calibration)"],
+    );
+    for (files, problem) in [
+        (["gyro.calib", "gyro.calib"], "both files have"),
+        (["counts.toml", "gyro.calib"], "which has both triads"),
+    ] {
+        let [first, second] = files;
+        let error = refused(
+            at,
+            &format!("verify counts --calibration {first} --calibration {second}"),
+        );
+        says(&error, &[problem, second]);
+    }
+}

@@ -32,7 +32,7 @@ use crate::triad::Forward;
 use crate::turntable::RatedDwells;
 use crate::unseen::Test;
 use crate::warning::Warning;
-use mimu_recording::error::{Error, Result};
+use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{Manifest, Reference};
 
 /// Errors of one triad of a recording with and without a calibration. Figures as in [`Figure`].
@@ -162,7 +162,7 @@ pub fn verify_since(
         }
     }
     if sensors.present().next().is_none() {
-        return Err(nothing_to_judge(&readings.as_read));
+        return Err(nothing_to_judge(&readings.as_read, calibration));
     }
     let (whole_turns, of_turns) = whole_turns::verify(&readings.as_read, calibration);
     warnings.extend(of_turns);
@@ -324,7 +324,15 @@ impl<'a> Readings<'a> {
     }
 }
 
-fn nothing_to_judge(prepared: &Prepared) -> Error {
+fn nothing_to_judge(prepared: &Prepared, calibration: &Calibration) -> Error {
+    if prepared.manifest.reference == Reference::Gravity
+        && calibration.inverse(Sensor::Accel).is_none()
+        && prepared.has(Sensor::Accel)
+    {
+        let problem = "the turns of the gyro are judged by the directions of gravity, and the calibration has no accelerometer";
+        let remedy = "give the calibration of the accelerometer too";
+        return Error::new(&prepared.place, problem, remedy).about(Argument::Calibration);
+    }
     let unused = Sensor::BOTH.map(|s| prepared.dwells.unused(s));
     let reason = unused.iter().find(|u| !u.is_empty());
     let error = Error::new(
