@@ -40,6 +40,9 @@ impl LogArgs {
 /// Folders of logs that were given in place of recordings; see [`remove_logs`].
 static LOGS: Mutex<Vec<TempDir>> = Mutex::new(Vec::new());
 
+/// Logs that were read, with the folders of their recordings: a command that turns from poses to a compass alone opens its log again.
+static READ: Mutex<Vec<(PathBuf, PathBuf)>> = Mutex::new(Vec::new());
+
 /// The recording at `path`: its folder. A file is a log: it is imported to the folder of `log`, or to one that lasts as long as the command, and what
 /// it was taken for is printed to standard error, where it does not disturb a result.
 ///
@@ -56,7 +59,13 @@ pub(crate) fn folder(path: &Path, log: &LogArgs) -> Result<PathBuf> {
     if !path.is_file() {
         return Ok(path.to_owned());
     }
-    Ok(imported_to(path, log)?.0)
+    let known = || READ.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some((_, folder)) = known().iter().find(|(log, _)| log == path) {
+        return Ok(folder.clone());
+    }
+    let (folder, _) = imported_to(path, log)?;
+    known().push((path.to_owned(), folder.clone()));
+    Ok(folder)
 }
 
 /// The folder to which the log at `path` is imported, and the options of its import.
@@ -104,6 +113,7 @@ fn scratch() -> Result<PathBuf> {
 
 /// Removes the folders of logs, at the end of a command.
 pub(crate) fn remove_logs() {
+    READ.lock().unwrap_or_else(PoisonError::into_inner).clear();
     LOGS.lock().unwrap_or_else(PoisonError::into_inner).clear();
 }
 

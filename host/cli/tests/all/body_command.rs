@@ -13,7 +13,7 @@ use mimu_rig::plan::Plan;
 use mimu_rig::rig_file::{RigFile, RigTruth};
 use serde_json::Value;
 
-use super::command::{done, json, says};
+use super::command::{done, json, mimu, says};
 
 const PLAN: &str = "format = \"mimu-plan/1\"\ndevice = \"board\"\nsample_rate_hz = 100.0\ncarrier = \"hands\"\n\
     gravity_mps2 = 9.80665\nlead_in_s = 8.0\n[[step]]\nposes = 24\ndwell_s = 3.0\n";
@@ -138,4 +138,41 @@ fn the_delay_of_an_accelerometer_against_its_gyro_is_found() {
     let off = (late.value - 12.0).abs();
     assert!(off < 2.0 * late.interval + 0.1, "{late:?}");
     assert!(late.interval < 1.0, "{late:?}");
+}
+
+/// A log without rests is taken up again for its compass: it is imported once, also if its recording is kept.
+#[test]
+fn a_log_without_rests_is_read_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let mut log =
+        String::from("t_s,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z,mag_x,mag_y,mag_z\n");
+    for k in 0..4000 {
+        let t = f64::from(k) / 100.0;
+        let [a, b, c] = [1.0, 1.7, 2.3].map(|rate| (rate * t + 0.3).sin());
+        let row = [
+            a,
+            b,
+            c,
+            9.0 * c,
+            9.0 * a,
+            9.0 * b,
+            40.0 * b,
+            40.0 * c,
+            40.0 * a,
+        ];
+        let cells: Vec<String> = row.iter().map(|v| format!("{v:.5}")).collect();
+        log += &format!("{t:.2},{}\n", cells.join(","));
+    }
+    std::fs::write(at.join("turned.csv"), log).unwrap();
+    for save in ["", " --save kept"] {
+        let ran = mimu(
+            at,
+            &format!("fit turned.csv --gravity 9.81 --units rad/s,m/s2{save}"),
+        );
+        assert_eq!(ran.status, Some(1), "{}", ran.stderr);
+        let read = ran.stderr.matches("4000 rows at").count();
+        assert_eq!(read, 1, "{}", ran.stderr);
+        assert!(!ran.stderr.contains("exists"), "{}", ran.stderr);
+    }
 }
