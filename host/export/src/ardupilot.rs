@@ -251,8 +251,5 @@ fn further(of: &FurtherTriad, export: &mut Export) -> Result<()> {
 
 /// Short name of a sensor in parameter names.
 fn short(sensor: Sensor) -> &'static str {
-    match sensor {
-        Sensor::Gyro => "GYR",
-        Sensor::Accel => "ACC",
-    }
+    sensor.pick("GYR", "ACC")
 }

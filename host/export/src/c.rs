@@ -190,10 +190,10 @@ impl Header<'_> {
     fn sensor(&self, sensor: Sensor) -> Option<Value> {
         let model = self.calibration.inverse(sensor)?;
         let table = self.calibration.table(sensor)?;
-        let (raw, own, own_unit) = match sensor {
-            Sensor::Gyro => ("g", "rate", "rad/s"),
-            Sensor::Accel => ("a", "force", "m/s^2, at rest it points up"),
-        };
+        let (raw, own, own_unit) = sensor.pick(
+            ("g", "rate", "rad/s"),
+            ("a", "force", "m/s^2, at rest it points up"),
+        );
         Some(json!({
             "sensor": sensor.name(),
             "raw": raw,

@@ -90,10 +90,7 @@ impl Options {
         if raw == RawUnit::Si || self.conversions()[sensor].si_per_raw.is_some() {
             return Ok(());
         }
-        let argument = match sensor {
-            Sensor::Gyro => Argument::GyroConversion,
-            Sensor::Accel => Argument::AccelConversion,
-        };
+        let argument = sensor.pick(Argument::GyroConversion, Argument::AccelConversion);
         Err(Error::new(
             sensor,
             format!("its scale factors are errors of the driver's factor, which is not given: the readings are in {raw}"),
@@ -136,10 +133,7 @@ impl Options {
 
 /// The first triad of a kind.
 pub(crate) fn name_of(sensor: Sensor) -> TriadName {
-    match sensor {
-        Sensor::Gyro => TriadName::GYRO,
-        Sensor::Accel => TriadName::ACCEL,
-    }
+    sensor.pick(TriadName::GYRO, TriadName::ACCEL)
 }
 
 /// Raw readings of `sensor`, for programs that take them.

@@ -75,10 +75,7 @@ impl Target for Iio {
         let missing = "its calibbias stays unchanged";
         for (entry, parts) in biases::<Self>(options, from, missing, &mut export)? {
             let sensor = entry.sensor;
-            let argument = match sensor {
-                Sensor::Gyro => Argument::GyroZero,
-                Sensor::Accel => Argument::AccelZero,
-            };
+            let argument = sensor.pick(Argument::GyroZero, Argument::AccelZero);
             let rounding = Remaining::of_rounding(sensor, STEP[sensor]);
             export.remaining.push(rounding);
             let _ = writeln!(body, "find_device \"${{1:-i[ci]m4*}}-{sensor}\"");

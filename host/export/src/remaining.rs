@@ -166,10 +166,7 @@ fn input(sensor: Sensor) -> f64 {
 }
 
 fn at_input(sensor: Sensor) -> &'static str {
-    match sensor {
-        Sensor::Gyro => "at 100 deg/s",
-        Sensor::Accel => "at 1 g",
-    }
+    sensor.pick("at 100 deg/s", "at 1 g")
 }
 
 /// Inputs along both directions of every axis.
@@ -296,10 +293,7 @@ pub(crate) fn effects(calibration: &Calibration) -> Vec<Remaining> {
         let Some(full) = alone() else {
             return Remaining::unknown(sensor, &id, "this program cannot evaluate it");
         };
-        let condition = match sensor {
-            Sensor::Gyro => "at up to 100 deg/s and 1 g",
-            Sensor::Accel => "at up to 1 g",
-        };
+        let condition = sensor.pick("at up to 100 deg/s and 1 g", "at up to 1 g");
         let errors = of_effect(&full, &models, sensor, limits);
         Remaining::new(sensor, &id, condition, &errors)
     };

@@ -188,10 +188,7 @@ impl WalkOptions {
         name: &str,
         gain: &[f64; 3],
     ) -> Result<Densities> {
-        let walk = match sensor {
-            Sensor::Gyro => self.gyro_walk,
-            Sensor::Accel => self.accel_walk,
-        };
+        let walk = sensor.pick(self.gyro_walk, self.accel_walk);
         let of = |term, given| worst(noise, channels, name, (sensor, term), given, gain);
         Ok(Densities {
             white: of(Term::N, None)?,

@@ -444,10 +444,7 @@ impl Calibration {
 
     /// The table of `sensor`.
     pub fn table(&self, sensor: Sensor) -> Option<&TriadTable> {
-        match sensor {
-            Sensor::Gyro => self.gyro.as_ref(),
-            Sensor::Accel => self.accel.as_ref(),
-        }
+        sensor.pick(self.gyro.as_ref(), self.accel.as_ref())
     }
 
     /// Whether it contains standard deviations. One that was fetched from a device does not.

@@ -155,10 +155,7 @@ impl Prior {
 
     /// The table of a triad.
     pub fn table(&self, sensor: Sensor) -> Option<&PriorTable> {
-        match sensor {
-            Sensor::Gyro => self.gyro.as_ref(),
-            Sensor::Accel => self.accel.as_ref(),
-        }
+        sensor.pick(self.gyro.as_ref(), self.accel.as_ref())
     }
 
     /// Sensors and numbers of units: `gyro of 60 units, accel of 60 units`. Empty if it has no table.

@@ -58,10 +58,10 @@ impl Population {
                 source: format!("{}: {} units", self.place, table.units),
             });
         };
-        let [offset, sheet] = match sensor {
-            Sensor::Gyro => [Quantity::GyroOffset, Quantity::GyroOffset],
-            Sensor::Accel => [Quantity::AccelOffset, Quantity::AccelSensitivity],
-        };
+        let [offset, sheet] = sensor.pick(
+            [Quantity::GyroOffset, Quantity::GyroOffset],
+            [Quantity::AccelOffset, Quantity::AccelSensitivity],
+        );
         // mg, as data sheets.
         let unit = si_per_sheet(sensor) / if sensor == Sensor::Accel { 1e3 } else { 1.0 };
         let biases = bounds.three("bias").filter(|_| self.prior.biases);

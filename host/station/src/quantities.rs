@@ -149,10 +149,10 @@ impl Quantities {
 
     fn noise(&mut self, samples: &Samples, rest: &Rest, scale: &Scale, sensor: Sensor, hz: f64) {
         let per_raw = scale.si_per_raw(sensor);
-        let (of_rms, of_density, by) = match sensor {
-            Sensor::Gyro => (Quantity::GyroNoise, Quantity::GyroDensity, [1.0, 1.0]),
-            Sensor::Accel => (Quantity::AccelNoise, Quantity::AccelDensity, [MILLI, MICRO]),
-        };
+        let (of_rms, of_density, by) = sensor.pick(
+            (Quantity::GyroNoise, Quantity::GyroDensity, [1.0, 1.0]),
+            (Quantity::AccelNoise, Quantity::AccelDensity, [MILLI, MICRO]),
+        );
         for (axis, c) in sensor.channels().enumerate() {
             let readings = &samples.batch.raw[c][rest.rows.clone()];
             let sheet = per_raw[axis] / si_per_sheet(sensor);
@@ -180,10 +180,10 @@ impl Quantities {
 
     /// Stuck bits, and runs of equal readings.
     fn codes(&mut self, samples: &Samples, rest: &Rest, scale: &Scale, sensor: Sensor) {
-        let (of_bits, of_run) = match sensor {
-            Sensor::Gyro => (Quantity::GyroBits, Quantity::GyroRun),
-            Sensor::Accel => (Quantity::AccelBits, Quantity::AccelRun),
-        };
+        let (of_bits, of_run) = sensor.pick(
+            (Quantity::GyroBits, Quantity::GyroRun),
+            (Quantity::AccelBits, Quantity::AccelRun),
+        );
         let lsb = scale.lsb[sensor as usize];
         let of = |c: usize| &samples.batch.raw[c][rest.rows.clone()];
         for (axis, c) in sensor.channels().enumerate() {

@@ -25,10 +25,7 @@ impl CommonErrors {
         };
         let sigma = error.standard();
         Self {
-            share: match sensor {
-                Sensor::Gyro => sigma.rate,
-                Sensor::Accel => sigma.gravity_mps2 / session.gravity_mps2,
-            },
+            share: sensor.pick(sigma.rate, sigma.gravity_mps2 / session.gravity_mps2),
             mounting_rad: sigma.mounting_deg.to_radians(),
         }
     }

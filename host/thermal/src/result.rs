@@ -271,10 +271,7 @@ fn biases(
 ) -> Vec<(TriadParameter, Estimate, String)> {
     let [model, _] = curves.forward(temp_c);
     let covariance = curves.covariance(temp_c);
-    let kind = match sensor {
-        Sensor::Gyro => ParameterKind::Bias,
-        Sensor::Accel => ParameterKind::BiasAndGravity,
-    };
+    let kind = sensor.pick(ParameterKind::Bias, ParameterKind::BiasAndGravity);
     (0..3)
         .map(|k| {
             let sigma = covariance[(9 + k, 9 + k)].max(0.0).sqrt();

@@ -60,10 +60,7 @@ fn panel(result: &AllanResult, sensor: Sensor, channels: &[&ChannelResult]) -> M
             )
         }));
     }
-    let sensors = match sensor {
-        Sensor::Gyro => "Gyros",
-        Sensor::Accel => "Accelerometers",
-    };
+    let sensors = sensor.pick("Gyros", "Accelerometers");
     let title = format!(
         "{sensors} of {}",
         result.device.as_deref().unwrap_or_default()

@@ -65,10 +65,10 @@ fn brown_out(level: u8) -> Markup {
 
 /// A range in the unit of data sheets.
 fn sensor_range(sensor: Sensor, range: f64) -> String {
-    let (value, unit) = match sensor {
-        Sensor::Gyro => (range.to_degrees(), "deg/s"),
-        Sensor::Accel => (range / STANDARD_GRAVITY, "g"),
-    };
+    let (value, unit) = sensor.pick(
+        (range.to_degrees(), "deg/s"),
+        (range / STANDARD_GRAVITY, "g"),
+    );
     // Single precision of SI is no digit of a data sheet.
     format!("{} {unit}", (value * 1e3).round() / 1e3)
 }

@@ -185,10 +185,7 @@ pub(super) fn written(text: &str) -> String {
 
 /// Name of a sensor in a sentence.
 pub(super) fn spoken(sensor: Sensor) -> &'static str {
-    match sensor {
-        Sensor::Gyro => "gyro",
-        Sensor::Accel => "accelerometer",
-    }
+    sensor.pick("gyro", "accelerometer")
 }
 
 /// Digits as superscripts.

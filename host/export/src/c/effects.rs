@@ -89,10 +89,8 @@ impl Effects {
     pub fn values(&self) -> Value {
         let removed = self.sensors().filter_map(|sensor| {
             let directions = self.directions[sensor].as_ref()?;
-            let (own, inputs) = match sensor {
-                Sensor::Gyro => ("rate", "clean, read_force"),
-                Sensor::Accel => ("force", "read_rate, clean"),
-            };
+            let (own, inputs) =
+                sensor.pick(("rate", "clean, read_force"), ("force", "read_rate, clean"));
             let errors = self.errors[sensor].iter().enumerate();
             let errors = errors.map(|(axis, terms)| match terms.is_empty() {
                 true => json!({"axis": axis, "sum": "0.0f"}),

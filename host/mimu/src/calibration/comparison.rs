@@ -324,10 +324,7 @@ fn parameters(calibration: &Calibration, temperatures: &[f64]) -> Vec<Named> {
 }
 
 fn name_of(sensor: Sensor) -> TriadName {
-    match sensor {
-        Sensor::Gyro => TriadName::GYRO,
-        Sensor::Accel => TriadName::ACCEL,
-    }
+    sensor.pick(TriadName::GYRO, TriadName::ACCEL)
 }
 
 /// C, o, rotation, delay and lever arm of a further triad.

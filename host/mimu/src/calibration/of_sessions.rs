@@ -68,10 +68,7 @@ impl Calibration {
     }
 
     fn table_mut(&mut self, sensor: Sensor) -> &mut Option<TriadTable> {
-        match sensor {
-            Sensor::Gyro => &mut self.gyro,
-            Sensor::Accel => &mut self.accel,
-        }
+        sensor.pick(&mut self.gyro, &mut self.accel)
     }
 }
 

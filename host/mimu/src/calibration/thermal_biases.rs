@@ -122,10 +122,7 @@ pub fn is_one(text: &str) -> bool {
 impl BiasNode {
     /// The reading of `sensor`.
     pub fn reading(&self, sensor: Sensor) -> Option<&RestReading> {
-        match sensor {
-            Sensor::Gyro => self.gyro.as_ref(),
-            Sensor::Accel => self.accel.as_ref(),
-        }
+        sensor.pick(self.gyro.as_ref(), self.accel.as_ref())
     }
 }
 

@@ -182,9 +182,6 @@ impl Part {
 
     /// Its limits for a sensor.
     pub fn sensor(&self, sensor: Sensor) -> Option<&PartSensor> {
-        match sensor {
-            Sensor::Gyro => self.gyro.as_ref(),
-            Sensor::Accel => self.accel.as_ref(),
-        }
+        sensor.pick(self.gyro.as_ref(), self.accel.as_ref())
     }
 }

@@ -62,10 +62,7 @@ impl DesignArgs {
     /// Whose noise is assumed, if none is given.
     pub(super) fn assumed_noise(&self) -> Option<&'static str> {
         let given = self.sigma.is_some() || self.noise.is_some();
-        (!given).then_some(match self.sensor() {
-            Sensor::Gyro => "an ADXRS300",
-            Sensor::Accel => "an MMA7260QT",
-        })
+        (!given).then_some(self.sensor().pick("an ADXRS300", "an MMA7260QT"))
     }
 
     /// Length of a dwell, s.

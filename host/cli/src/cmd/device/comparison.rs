@@ -111,10 +111,7 @@ pub fn run_kalman(args: &KalmanArgs) -> Result<()> {
     let asks = std::io::stdin().is_terminal();
     let apply = |input: &[f32; 3]| {
         if asks {
-            let unit = match sensor {
-                Sensor::Gyro => "rad/s",
-                Sensor::Accel => "m/s²",
-            };
+            let unit = sensor.pick("rad/s", "m/s²");
             eprint!(
                 "apply {}, {}, {} {unit}, then press Enter: ",
                 input[0], input[1], input[2]
