@@ -4,16 +4,11 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use mimu::data_sheet::Part;
-use mimu::judgement::Judgement;
-use mimu::noise::noise_file::NoiseFile;
-use mimu::prepared::Prepared;
-use mimu::quantity::{Sensor, normal_gravity};
 use mimu::readable::STANDARD_GRAVITY;
 use mimu::signal::dwell::Keep;
 use mimu::signal::stillness::{DwellSearch, STILL_FACTOR, Steps};
-use mimu::warning::Warning;
-use mimu_recording::error::{Argument, Error, Result};
-use mimu_recording::{Reference, WholeTurns};
+use mimu::{Judgement, NoiseFile, Prepared, Sensor, Warning, normal_gravity};
+use mimu_recording::{Argument, Error, Reference, Result, WholeTurns};
 use mimu_wizard::procedure::Targets;
 
 use crate::overwriting::check_overwritten;

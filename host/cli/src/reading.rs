@@ -5,8 +5,7 @@ use std::sync::atomic::Ordering;
 use std::sync::{Mutex, PoisonError};
 
 use clap::Args;
-use mimu::prepared::Prepared;
-use mimu::signal::stillness::DwellSearch;
+use mimu::{DwellSearch, Prepared};
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{ImportOptions, LogOptions, MANIFEST_FILE, PoseMeans, Recording};
 use tempfile::TempDir;

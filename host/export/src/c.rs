@@ -12,9 +12,7 @@
 mod effects;
 
 use clap::Args;
-use mimu::calibration::Calibration;
-use mimu::calibration::body::BodyTriad;
-use mimu::quantity::Sensor;
+use mimu::{BodyTriad, Calibration, Sensor};
 use mimu_core::compensation::Affine;
 use mimu_core::die::{BEYOND_C, RATE_SHARE};
 use mimu_core::effects::REFERENCE_C;

@@ -4,13 +4,10 @@
 //! a calibration file applies to the raw readings u.
 
 use clap::Args;
-use mimu::calibration::Calibration;
 use mimu::calibration::bias_cubic::{Conversion, KnownConversion};
-use mimu::quantity::{PerSensor, Sensor};
-use mimu::triad::Forward;
+use mimu::{Calibration, Forward, PerSensor, Sensor};
 use mimu_core::compensation::Affine;
-use mimu_recording::error::{Argument, Error, Result};
-use mimu_recording::{RawUnit, TriadName};
+use mimu_recording::{Argument, Error, RawUnit, Result, TriadName};
 use nalgebra::{Matrix3, Vector3};
 
 use crate::Sources;

@@ -12,8 +12,7 @@
 
 use std::fmt::Write as _;
 
-use mimu::quantity::{PerSensor, Sensor};
-use mimu::readable::STANDARD_GRAVITY;
+use mimu::{PerSensor, STANDARD_GRAVITY, Sensor};
 use mimu_recording::error::{Argument, Result};
 
 use crate::biases::biases;

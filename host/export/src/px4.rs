@@ -14,8 +14,7 @@
 
 use mimu::calibration::bias_cubic::BiasCubics;
 use mimu::quantity::Sensor;
-use mimu_recording::TriadKind;
-use mimu_recording::error::{Argument, Result};
+use mimu_recording::{Argument, Result, TriadKind};
 
 use crate::convention::{Bias, Convention, Shape};
 use crate::layout::{Entry, Numbers};

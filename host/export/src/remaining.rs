@@ -5,10 +5,7 @@
 
 use mimu::calibration::bias_cubic::BiasCubics;
 use mimu::calibration::{Calibration, compensator};
-use mimu::effects::fitted::FittedEffect;
-use mimu::quantity::Sensor;
-use mimu::readable;
-use mimu::triad::Forward;
+use mimu::{FittedEffect, Forward, Sensor, readable};
 use mimu_core::compensation::{Affine, Compensation, Sample};
 use mimu_core::compensator::Compensator;
 use mimu_core::effects::{Effects, REFERENCE_C};

@@ -8,8 +8,7 @@
 
 use clap::Args;
 use mimu::noise::noise_file::{NoiseChannel, NoiseFile};
-use mimu::quantity::{AXES, PerSensor, Sensor};
-use mimu::readable::STANDARD_GRAVITY;
+use mimu::{AXES, PerSensor, STANDARD_GRAVITY, Sensor};
 use mimu_allan::model::Term;
 use mimu_recording::error::{Argument, Error, Result};
 

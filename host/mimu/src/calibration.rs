@@ -40,10 +40,9 @@ use crate::judgement::Judgement;
 use crate::quantity::{Sensor, significant};
 use crate::triad::Covariance;
 use crate::warning::Warning;
-use mimu_recording::error::Result;
 use mimu_recording::{
-    ClockRate, Manifest, RawUnit, Reference, SensorSettings, UNNAMED, are_two_units, check_kind,
-    parse_toml, read_text,
+    ClockRate, Manifest, RawUnit, Reference, Result, SensorSettings, UNNAMED, are_two_units,
+    check_kind, parse_toml, read_text,
 };
 
 /// Relative difference of two ranges that are the same.

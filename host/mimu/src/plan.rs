@@ -13,8 +13,7 @@ use std::time::Duration;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use mimu_recording::error::{Argument, Error, Result};
-use mimu_recording::{check_kind, parse_toml, read_text};
+use mimu_recording::{Argument, Error, Result, check_kind, parse_toml, read_text};
 
 use crate::plan::design::model::Setting;
 use crate::plan::design::reach::Fixture;

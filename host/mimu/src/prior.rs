@@ -15,8 +15,7 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use crate::parameter::TriadParameter;
 use crate::quantity::{PerSensor, Sensor, raw_unit, scale_unit};
 use crate::triad::{Triad, physical_of};
-use mimu_recording::error::{Error, Result};
-use mimu_recording::{RawUnit, Reference, check_kind, parse_toml, read_text};
+use mimu_recording::{Error, RawUnit, Reference, Result, check_kind, parse_toml, read_text};
 
 /// Version of the file.
 const FORMAT: &str = "mimu-prior/1";

@@ -31,9 +31,8 @@ use mimu_allan::model::{
 };
 use mimu_allan::spectrum::Lines;
 use mimu_allan::{Deviation, NotFinite, Point, Spacing};
-use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::health::{At, Finding, Temperatures};
-use mimu_recording::{Column, RAW_COLUMNS, RawUnit, Recording};
+use mimu_recording::{Argument, Column, Error, RAW_COLUMNS, RawUnit, Recording, Result};
 
 /// What to compute.
 #[derive(Debug, Clone, Copy, PartialEq)]

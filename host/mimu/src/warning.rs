@@ -7,9 +7,8 @@ use words::{degrees, off, open};
 use std::fmt::Display;
 use std::mem::discriminant;
 
-use mimu_recording::error::Error;
 use mimu_recording::health::Finding;
-use mimu_recording::{ClockRate, RAW_COLUMNS, RawUnit, TriadName};
+use mimu_recording::{ClockRate, Error, RAW_COLUMNS, RawUnit, TriadName};
 use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
 

@@ -5,8 +5,7 @@ use std::path::Path;
 use mimu::data_sheet::{Part, Property};
 use mimu::quantity::Sensor;
 use mimu::readable::STANDARD_GRAVITY;
-use mimu_recording::error::{Error, Result};
-use mimu_recording::{RawUnit, check_kind, parse_toml, read_text};
+use mimu_recording::{Error, RawUnit, Result, check_kind, parse_toml, read_text};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 

@@ -4,8 +4,7 @@
 
 use mimu::prior::{FALSE_STRANGER, Prior, PriorTable};
 use mimu::quantity::{AXES, Sensor};
-use mimu_recording::RawUnit;
-use mimu_recording::error::{Error, Result};
+use mimu_recording::{Error, RawUnit, Result};
 use nalgebra::Vector3;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 

@@ -1,13 +1,9 @@
 //! Readings in SI: by a calibration, by the board, or by the range that is set.
 
-use mimu::calibration::Calibration;
 use mimu::data_sheet::Part;
-use mimu::quantity::Sensor;
-use mimu::readable::STANDARD_GRAVITY;
-use mimu::triad::Forward;
+use mimu::{Calibration, Forward, STANDARD_GRAVITY, Sensor};
 use mimu_core::compensation::Affine;
-use mimu_recording::RawUnit;
-use mimu_recording::error::{Error, Result};
+use mimu_recording::{Error, RawUnit, Result};
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 

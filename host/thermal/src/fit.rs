@@ -4,8 +4,7 @@ use mimu::calibration::{Calibration, CurvesOfUnit, TriadOfCurves, reference_node
 use mimu::estimate::earth::RATE;
 use mimu::quantity::{PerSensor, Sensor};
 use mimu::signal::blocks::extent;
-use mimu_recording::error::{Error, Result};
-use mimu_recording::{Reference, are_two_units};
+use mimu_recording::{Error, Reference, Result, are_two_units};
 use serde::Serialize;
 
 use crate::basis::{CURVATURE_SPAN, Shape};

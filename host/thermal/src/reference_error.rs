@@ -2,8 +2,7 @@
 
 use mimu::quantity::Sensor;
 use mimu::triad::{Covariance, Forward, vector};
-use mimu_recording::error::{Error, Result};
-use mimu_recording::{Reference, ReferenceError};
+use mimu_recording::{Error, Reference, ReferenceError, Result};
 use nalgebra::Vector3;
 
 use crate::session::Session;

@@ -1,9 +1,8 @@
 //! `mimu-thermal/1`: what a fit over temperature found. SI and raw units throughout; what is not a number is null.
 
-use mimu::judgement::Judgement;
 use mimu::parameter::{ParameterKind, TriadParameter, parameters};
 use mimu::quantity::{PerSensor, Sensor, present, raw_unit};
-use mimu::triad::Estimate;
+use mimu::{Estimate, Judgement};
 use mimu_recording::RawUnit;
 use serde::Serialize;
 

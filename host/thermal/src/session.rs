@@ -1,13 +1,11 @@
 //! One recording, from power-on to power-off, as rows: means of some seconds with their known input, and the thermometer.
 
 use mimu::estimate::EarthShare;
-use mimu::prepared::Prepared;
-use mimu::quantity::{PerSensor, Sensor};
 use mimu::signal::blocks::{Block, Condensed};
 use mimu::signal::dwell::Dwell;
+use mimu::{PerSensor, Prepared, Sensor};
 use mimu_allan::variance::AllanModel;
-use mimu_recording::error::{Error, Result};
-use mimu_recording::{RawUnit, Reference, ReferenceError, SensorSettings};
+use mimu_recording::{Error, RawUnit, Reference, ReferenceError, Result, SensorSettings};
 use nalgebra::Vector3;
 
 use crate::bias_jumps::{self, BiasJump};

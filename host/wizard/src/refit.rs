@@ -2,15 +2,11 @@
 
 use std::sync::Arc;
 
-use mimu::fit::{Fit, Options, SensorFit, fit};
-use mimu::prepared::Prepared;
 use mimu::prior::Prior;
-use mimu::quantity::{AXES, Sensor};
 use mimu::readable::STANDARD_GRAVITY;
 use mimu::signal::stillness::STILL_FACTOR;
-use mimu::triad::{Angles, Estimate};
-use mimu_recording::error::Result;
-use mimu_recording::{Batch, Manifest};
+use mimu::{AXES, Angles, Estimate, Fit, Options, Prepared, Sensor, SensorFit, fit};
+use mimu_recording::{Batch, Manifest, Result};
 use serde::Serialize;
 
 use crate::procedure::{Missed, Targets};

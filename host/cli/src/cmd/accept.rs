@@ -6,13 +6,11 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use clap::{Args, ValueEnum};
-use mimu::calibration::Calibration;
 use mimu::data_sheet::Part;
-use mimu::judgement::JudgementKind;
 use mimu::prior::Prior;
-use mimu_recording::are_two_units;
-use mimu_recording::error::{Error, Result};
+use mimu::{Calibration, JudgementKind};
 use mimu_recording::result_file::stage;
+use mimu_recording::{Error, Result, are_two_units};
 use mimu_station::decision::Rule;
 use mimu_station::document::{AsFound, Document, Verdict, judged, verdict};
 use mimu_station::faces::{Face, by_faces};

@@ -9,8 +9,7 @@ use clap::{Args, ValueEnum};
 use mimu::result::allan::AllanResult;
 use mimu::survey::{Options, Part, survey_all};
 use mimu_allan::Deviation;
-use mimu_recording::error::{Error, Result};
-use mimu_recording::{MANIFEST_FILE, Recording};
+use mimu_recording::{Error, MANIFEST_FILE, Recording, Result};
 
 use crate::arguments::{JsonArgs, StrictArgs, VerboseArgs, number};
 use crate::hint::OF_A_LOG;

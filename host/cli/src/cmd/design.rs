@@ -14,8 +14,7 @@ use mimu::plan::design::tour::{Motion, randomised};
 use mimu::quantity::Sensor;
 use mimu::result::design::{Conditions, Design};
 use mimu::result::next_experiment::NextExperiment;
-use mimu_recording::Reference;
-use mimu_recording::error::{Error, Result};
+use mimu_recording::{Error, Reference, Result};
 use nalgebra::Vector3;
 use serde::Serialize;
 

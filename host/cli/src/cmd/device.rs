@@ -15,8 +15,7 @@ use mimu_core::wire::Request;
 use mimu_device::{
     Answer, Counted, DeviceResult, Session, Stream, Verdict, look, self_test, stream,
 };
-use mimu_recording::RAW_COLUMNS;
-use mimu_recording::error::{Error, Result};
+use mimu_recording::{Error, RAW_COLUMNS, Result};
 use mimu_station::side::direction;
 use nalgebra::Vector3;
 use signal_hook::consts::TERM_SIGNALS;

@@ -3,13 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Arg, ArgMatches, Args, Command, FromArgMatches, Subcommand};
-use mimu::calibration::Calibration;
 use mimu::calibration::thermal_biases::{self, ThermalBiases};
-use mimu::noise::noise_file::NoiseFile;
+use mimu::{Calibration, NoiseFile};
 use mimu_export::{Choice, Export, Noise, Sources};
-use mimu_recording::error::{Argument, Error, Result};
-use mimu_recording::read_text;
 use mimu_recording::result_file::stage;
+use mimu_recording::{Argument, Error, Result, read_text};
 use serde::Serialize;
 
 use crate::arguments::JsonArgs;

@@ -4,26 +4,20 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use clap::{Args, ValueEnum};
-use mimu::calibration::Calibration;
 use mimu::data_sheet::DataSheet;
 use mimu::fit::{Fit, Options, fit_or_faces};
 use mimu::in_use::Trajectory;
-use mimu::judgement::Judgement;
-use mimu::noise::noise_file::NoiseFile;
-use mimu::prepared::Prepared;
 use mimu::prior::Prior;
-use mimu::quantity::PerSensor;
 use mimu::recording_problem::OfRecording;
 use mimu::result::fit::{DwellResult, FitResult};
 use mimu::result::sessions::SessionsResult;
 use mimu::sessions::class::PartClass;
 use mimu::sessions::{Sessions, fit_determined};
 use mimu::signal::dwell::Dwell;
-use mimu::signal::stillness::DwellSearch;
+use mimu::{Calibration, DwellSearch, Judgement, NoiseFile, PerSensor, Prepared};
 use mimu_body::result::BodyResult;
 use mimu_body::{Body, Options as BodyOptions};
-use mimu_recording::error::{Error, Result};
-use mimu_recording::{MANIFEST_FILE, Recording, ReferenceError};
+use mimu_recording::{Error, MANIFEST_FILE, Recording, ReferenceError, Result};
 use serde::Serialize;
 
 use super::trajectory::{self, TrajectoryArgs};

@@ -10,8 +10,7 @@ use clap::Args;
 use indicatif::ProgressBar;
 use mimu::plan::Plan;
 use mimu_device::record::{Known, RecordOptions, RecordingState, Steps, UserRequest, record};
-use mimu_recording::error::{Error, Result};
-use mimu_recording::{Inputs, SampleFormat};
+use mimu_recording::{Error, Inputs, Result, SampleFormat};
 
 use crate::arguments::{JsonArgs, assumed_gravity, known_gravity, warned};
 use crate::cmd::device::{PortArgs, duration, interruption, open};

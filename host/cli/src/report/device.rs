@@ -1,8 +1,7 @@
 //! Results of the device's commands and recordings from it.
 
 use maud::{Markup, html};
-use mimu::quantity::{AXES, Sensor, plural, significant};
-use mimu::readable::STANDARD_GRAVITY;
+use mimu::{AXES, STANDARD_GRAVITY, Sensor, plural, significant};
 use mimu_device::record::RecordSummary;
 use mimu_device::{
     Checked, Contents, Counted, DeviceResult, Identity, KalmanRun, LineCount, SelfTested, Streamed,

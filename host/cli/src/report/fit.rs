@@ -3,14 +3,11 @@
 use std::cmp::Reverse;
 
 use maud::{Markup, html};
-use mimu::fit::Split;
 use mimu::judge::input;
-use mimu::judgement::JudgementKind;
 use mimu::parameter::ParameterKind;
-use mimu::quantity::{Sensor, plural, plus_minus, significant};
 use mimu::readable::{self, Readable};
 use mimu::result::fit::{DwellResult, FitResult, Parameter, SensorFitResult};
-use mimu::warning::Warning;
+use mimu::{JudgementKind, Sensor, Split, Warning, plural, plus_minus, significant};
 use mimu_recording::Reference;
 
 use super::page::{Level, judged, kinds, problems, warnings};

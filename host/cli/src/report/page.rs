@@ -6,10 +6,7 @@ use std::fmt::Display;
 use std::path::PathBuf;
 
 use maud::{Markup, PreEscaped, html};
-use mimu::judgement::Judgement;
-use mimu::quantity::{Sensor, significant};
-use mimu::readable::Readable;
-use mimu::recording_problem::OfRecording;
+use mimu::{Judgement, OfRecording, Readable, Sensor, significant};
 
 use super::terminal::text;
 use crate::output::now;

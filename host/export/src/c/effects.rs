@@ -1,10 +1,8 @@
 //! Effects in the header: their regressors as C expressions.
 
-use mimu::calibration::Calibration;
-use mimu::effects::fitted::FittedEffect;
 use mimu::effects::quantity::Quantity;
 use mimu::effects::regressor::{Product, Regressor};
-use mimu::quantity::{PerSensor, Sensor};
+use mimu::{Calibration, FittedEffect, PerSensor, Sensor};
 use mimu_core::die::BEYOND_C;
 use mimu_core::effects::{Directions, RATE_LAG_S};
 use mimu_recording::error::{Error, Result};

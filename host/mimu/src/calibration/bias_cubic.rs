@@ -10,8 +10,7 @@ use crate::calibration::{Calibration, Curves};
 use crate::quantity::{AXES, Sensor};
 use crate::readable::STANDARD_GRAVITY;
 use crate::triad::Forward;
-use mimu_recording::RawUnit;
-use mimu_recording::error::{Error, Result};
+use mimu_recording::{Error, RawUnit, Result};
 
 /// Temperatures at which a cubic is fitted and judged.
 const POINTS: usize = 401;

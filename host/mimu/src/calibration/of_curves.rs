@@ -5,8 +5,7 @@ use super::{Calibration, FIGURE_DIGITS, Judged, Origin, OverTemperature};
 use crate::judgement::Judgement;
 use crate::quantity::{Figure, PerSensor, Sensor, rounded};
 use crate::triad::Triad;
-use mimu_recording::error::Result;
-use mimu_recording::{RawUnit, Reference, SensorSettings};
+use mimu_recording::{RawUnit, Reference, Result, SensorSettings};
 
 /// A triad at the temperature of one node, with the error figures of its curves.
 #[derive(Debug, Clone)]

@@ -13,8 +13,7 @@ use crate::fit::{Fit, SensorFit};
 use crate::judgement::Judgement;
 use crate::quantity::{PerSensor, Sensor, inverse_names, rounded};
 use crate::triad::{Angles, Covariance, Estimate, Forward, Physical, Triad};
-use mimu_recording::error::Result;
-use mimu_recording::{Manifest, RawUnit, Reference};
+use mimu_recording::{Manifest, RawUnit, Reference, Result};
 
 /// Digits of standard deviations and intervals.
 const SIGMA_DIGITS: usize = 4;

@@ -14,8 +14,7 @@ use super::check::{problem_of_range, problem_of_temperature};
 use super::{DieTable, Origin};
 use crate::judgement::Judgement;
 use crate::quantity::{PerSensor, Sensor};
-use mimu_recording::error::{Error, Result};
-use mimu_recording::parse_toml;
+use mimu_recording::{Error, Result, parse_toml};
 
 /// Version of the layout.
 const FORMAT: &str = "mimu-thermal-biases/1";

@@ -5,8 +5,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use crate::quantity::{AXES, Sensor};
-use mimu_recording::error::{Error, Result};
-use mimu_recording::{check_kind, parse_toml, read_text};
+use mimu_recording::{Error, Result, check_kind, parse_toml, read_text};
 
 /// Version of the file of a part.
 const FORMAT: &str = "mimu-part/1";

@@ -16,8 +16,7 @@ use crate::signal::dwell::{Dwell, Fault};
 use crate::signal::increment::Increment;
 use crate::triad::directions;
 use crate::warning::Warning;
-use mimu_recording::Reference;
-use mimu_recording::error::{Error, Result};
+use mimu_recording::{Error, Reference, Result};
 
 /// Errors of the axes of the sensor under some conditions, SI. For effects with a lag, the conditions have to contain the temperature behind that
 /// lag.

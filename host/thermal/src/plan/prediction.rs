@@ -1,8 +1,7 @@
 //! Standard deviations of the curves that a procedure gives, from the information matrix of the regression.
 
-use mimu::plan::design::reach::Fixture;
 use mimu::plan::{Plan, Planned};
-use mimu::quantity::Sensor;
+use mimu::{Fixture, Sensor};
 use mimu_recording::error::Result;
 use nalgebra::{DMatrix, DVector, Vector3};
 use serde::Serialize;

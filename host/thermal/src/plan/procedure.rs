@@ -1,10 +1,9 @@
 //! What chamber and table do in each procedure, and when.
 
 use mimu::plan::design::model::Setting;
-use mimu::plan::design::reach::Fixture;
 use mimu::plan::design::tour::Motion;
 use mimu::plan::{Step, TableAxis, chamber};
-use mimu::quantity::duration;
+use mimu::{Fixture, duration};
 use mimu_recording::error::{Argument, Error, Result};
 use nalgebra::Vector3;
 use serde::Serialize;

@@ -2,19 +2,15 @@
 
 use std::path::Path;
 
-use mimu::effects;
-use mimu::fit::{Fit, Options, fit};
-use mimu::noise::noise_file::NoiseFile;
 use mimu::plan::design::budget::DwellNoise;
 use mimu::plan::design::reach::{Fixture, RateList, Rates};
 use mimu::plan::design::tour::Motion;
 use mimu::plan::next_experiment::prediction::Target;
 use mimu::plan::next_experiment::{CHAMBER_C, DWELL_S, RATE_DPS, SLEW, Setup, smallest};
-use mimu::quantity::Sensor;
 use mimu::result::next_experiment::NextExperiment;
 use mimu::signal::stillness::STILL_FACTOR;
-use mimu_recording::Reference;
-use mimu_recording::error::{Error, Result};
+use mimu::{Fit, NoiseFile, Options, Sensor, effects, fit};
+use mimu_recording::{Error, Reference, Result};
 
 use super::{DesignArgs, NoiseArg};
 use crate::reading::{LogArgs, read};

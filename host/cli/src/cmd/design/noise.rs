@@ -3,10 +3,8 @@
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use mimu::noise::noise_file::NoiseFile;
 use mimu::plan::design::budget::DwellNoise;
-use mimu::plan::design::reach::Fixture;
-use mimu::quantity::Sensor;
+use mimu::{Fixture, NoiseFile, Sensor};
 use mimu_recording::error::Result;
 
 use super::DesignArgs;

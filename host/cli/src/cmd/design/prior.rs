@@ -9,8 +9,7 @@ use mimu::prior::Prior;
 use mimu::quantity::{Sensor, significant};
 use mimu::readable::STANDARD_GRAVITY;
 use mimu::result::design::Design;
-use mimu_recording::Reference;
-use mimu_recording::error::{Error, Result};
+use mimu_recording::{Error, Reference, Result};
 use mimu_wizard::procedure::Targets;
 
 use super::{DesignArgs, TableArg};

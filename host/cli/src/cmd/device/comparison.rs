@@ -6,8 +6,7 @@ use std::time::Duration;
 
 use crate::report;
 use clap::Args;
-use mimu::calibration::Calibration;
-use mimu::quantity::Sensor;
+use mimu::{Calibration, Sensor};
 use mimu_device::{DeviceResult, KalmanPlan, SHORTEST, check, kalman};
 use mimu_recording::error::{Error, Result};
 

@@ -3,10 +3,9 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use mimu::noise::noise_file::NoiseFile;
 use mimu::plan::design::budget::DwellNoise;
-use mimu::quantity::Sensor;
 use mimu::signal::blocks::extent;
+use mimu::{NoiseFile, Sensor};
 use mimu_recording::error::Result;
 use mimu_thermal::basis::Shape;
 use mimu_thermal::plan::{Procedure, Request, plan, to_toml};

@@ -7,8 +7,7 @@ use super::{
 };
 use crate::calibration::thermal_biases::ThermalBiases;
 use crate::quantity::Sensor;
-use mimu_recording::RawUnit;
-use mimu_recording::error::{Argument, Error, Result};
+use mimu_recording::{Argument, Error, RawUnit, Result};
 
 impl BiasCubics {
     /// The cubics of `sensor` over `range_c`, about `reference_c`; `None` if `biases` has no readings of it.
