@@ -106,7 +106,7 @@ pub(crate) fn remove_logs() {
     LOGS.lock().unwrap_or_else(PoisonError::into_inner).clear();
 }
 
-/// Reads a recording of samples or of means like [`read`]; with the recording, if it is one of samples.
+/// Reads a recording of samples or of means like [`read_samples`]; with the recording, if it is one of samples.
 pub(crate) fn read_with_samples(
     directory: &Path,
     log: &LogArgs,
@@ -126,17 +126,6 @@ pub(crate) fn read_with_samples(
 }
 
 /// Reads a recording, after checking that the results can be written and overwrite no input.
-pub(crate) fn read(
-    directory: &Path,
-    log: &LogArgs,
-    search: DwellSearch,
-    outputs: &[Option<&Path>],
-    others: &[Option<&Path>],
-) -> Result<Prepared> {
-    Ok(read_samples(directory, log, search, outputs, others)?.0)
-}
-
-/// As [`read`], with the recording.
 pub(crate) fn read_samples(
     directory: &Path,
     log: &LogArgs,
@@ -145,23 +134,12 @@ pub(crate) fn read_samples(
     others: &[Option<&Path>],
 ) -> Result<(Prepared, Recording)> {
     let recording = open(directory, log)?;
-    let prepared = read_opened(&recording, directory, search, outputs, others)?;
-    Ok((prepared, recording))
-}
-
-fn read_opened(
-    recording: &Recording,
-    directory: &Path,
-    search: DwellSearch,
-    outputs: &[Option<&Path>],
-    others: &[Option<&Path>],
-) -> Result<Prepared> {
     let manifest = recording.directory.join(MANIFEST_FILE);
     let mut inputs: Vec<&Path> = vec![&manifest, &recording.samples, directory];
     inputs.extend(others.iter().flatten());
     check_outputs(outputs, &inputs)?;
     let bar = progress("reading");
-    let prepared = Prepared::read(recording, search, |share| bar.reach(share));
+    let prepared = Prepared::read(&recording, search, |share| bar.reach(share));
     bar.finish();
-    prepared
+    Ok((prepared?, recording))
 }

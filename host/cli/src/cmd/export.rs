@@ -111,12 +111,8 @@ pub fn run(args: &ExportArgs) -> Result<()> {
         let problem = "this format cannot contain the noise of a unit";
         return Err(Error::new("export", problem, "leave it out").about(Argument::Noise));
     }
-    let inputs: Vec<&Path> = file
-        .into_iter()
-        .chain(&args.noise)
-        .map(PathBuf::as_path)
-        .collect();
-    check_outputs(&[Some(path), args.json.file()], &inputs)?;
+    let inputs = file.into_iter().chain(&args.noise);
+    check_outputs(&[Some(path), args.json.file()], inputs)?;
     check_overwritten(&[Some(path)])?;
     let named = file.map(|p| p.display().to_string());
     let (mut calibration, mut biases) = (None, None);

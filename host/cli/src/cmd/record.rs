@@ -1,7 +1,7 @@
 //! `mimu record`: arguments and execution.
 
 use std::io::IsTerminal as _;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
@@ -107,9 +107,8 @@ fn every(text: &str) -> std::result::Result<(Duration, Duration), String> {
 }
 
 pub fn run(args: &RecordArgs) -> Result<()> {
-    let inputs = [args.plan.as_deref(), args.inputs.as_deref()];
-    let inputs: Vec<&Path> = inputs.into_iter().flatten().collect();
-    check_outputs(&[args.json.file()], &inputs)?;
+    let inputs = args.plan.iter().chain(&args.inputs);
+    check_outputs(&[args.json.file()], inputs)?;
     let plan = args.plan.as_deref().map(Plan::read).transpose()?;
     let gravity_mps2 = args.of.gravity_mps2(plan.as_ref());
     let (known, table) = match (&plan, &args.plan, &args.inputs) {
