@@ -440,10 +440,7 @@ impl Channel {
             (None, Some(share)) => Warning::Drifts { share, longest_s },
             (None, None) => return,
         };
-        warnings.push(Warning::Channel {
-            channel: self.name,
-            warning: Box::new(warning),
-        });
+        warnings.push(Warning::Channel(self.name, Box::new(warning)));
         if options.kind != Deviation::Hadamard {
             let times = Spacing::PerDecade(options.per_decade);
             self.hadamard = Some(integrated.curve(Deviation::Hadamard, &times, options.confidence));
