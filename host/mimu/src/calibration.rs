@@ -48,7 +48,7 @@ use mimu_recording::{
 /// Relative difference of two ranges that are the same.
 const SAME_RANGE: f64 = 0.01;
 /// Program and version, as results name them.
-pub(crate) const TOOL: &str = concat!("mimu ", env!("CARGO_PKG_VERSION"));
+pub const TOOL: &str = concat!("mimu ", env!("CARGO_PKG_VERSION"));
 /// Version of the layout of a calibration at one temperature.
 const FORMAT: &str = "mimu-calibration/1";
 /// Version of the layout with curves over temperature. A program that does not know curves refuses it, instead of applying the one model.
