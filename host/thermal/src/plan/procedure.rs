@@ -12,8 +12,9 @@ use super::Request;
 use crate::basis::Shape;
 
 /// Sequences of temperatures and motions.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, strum::IntoStaticStr)]
 #[serde(rename_all = "kebab-case")]
+#[strum(serialize_all = "kebab-case")]
 pub enum Procedure {
     /// Set points, at each of which the unit takes the chamber's temperature before it is measured: fang, section 3.
     Soak,
@@ -28,12 +29,7 @@ pub enum Procedure {
 impl Procedure {
     /// As on the command line.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Soak => "soak",
-            Self::Niu => "niu",
-            Self::Ramp => "ramp",
-            Self::RestRamp => "rest-ramp",
-        }
+        self.into()
     }
 }
 
