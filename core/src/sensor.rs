@@ -46,6 +46,14 @@ impl Sensor {
         }
     }
 
+    /// `gyro` for a gyro, `accel` for an accelerometer.
+    pub fn pick<T>(self, gyro: T, accel: T) -> T {
+        match self {
+            Self::Gyro => gyro,
+            Self::Accel => accel,
+        }
+    }
+
     /// The other triad.
     pub const fn other(self) -> Self {
         match self {

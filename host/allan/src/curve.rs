@@ -10,7 +10,7 @@
 //! deviation is then still known to 0.6 %); the edf of the point includes it. With this rule the cost of a curve grows about as N from 1e6
 //! samples on, however densely the times are spaced.
 
-use super::bounds::{self, Estimator};
+use super::bounds::{self, Estimator, Sampling};
 use super::deviation::{ALL_TERMS, BLOCK, Integrated, Plan, Squares, sums_of_squares};
 use super::power_law::power_law;
 use super::{Deviation, NotFinite, Point, Spacing};
@@ -38,20 +38,6 @@ pub fn curve(
     confidence: f64,
 ) -> Result<Vec<Point>, NotFinite> {
     Ok(Integrated::new(rates.to_vec(), dt_s)?.curve(kind, spacing, confidence))
-}
-
-/// The same from the integral (angle, velocity, "phase"), in the unit of the integral per second.
-///
-/// # Errors
-/// As [`curve`].
-pub fn curve_of_phase(
-    phase: &[f64],
-    dt_s: f64,
-    kind: Deviation,
-    spacing: &Spacing,
-    confidence: f64,
-) -> Result<Vec<Point>, NotFinite> {
-    Ok(Integrated::of_phase(phase, dt_s)?.curve(kind, spacing, confidence))
 }
 
 impl Spacing {
@@ -121,11 +107,11 @@ impl Integrated {
         let (tau, mean) = (m as f64, sum_of_squares / terms as f64);
         let power = if kind == Deviation::Modified { 4 } else { 2 };
         let variance = mean / (kind.squares() * tau.powi(power));
-        let deviation = variance.sqrt() / self.step();
+        let deviation = variance.sqrt();
         let alpha = power_law(x, kind, m);
         let edf = Estimator {
             kind,
-            sampling: self.sampling(),
+            sampling: Sampling::Instants,
             m,
             stride,
             terms,

@@ -2,18 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::{Args, ValueEnum};
+use clap::Args;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use mimu::data_sheet::Part;
-use mimu::judgement::Judgement;
-use mimu::noise::noise_file::NoiseFile;
-use mimu::prepared::Prepared;
-use mimu::quantity::{Sensor, normal_gravity};
-use mimu::readable::STANDARD_GRAVITY;
 use mimu::signal::dwell::Keep;
 use mimu::signal::stillness::{DwellSearch, STILL_FACTOR, Steps};
-use mimu::warning::Warning;
-use mimu_recording::error::{Argument, Error, Result};
-use mimu_recording::{Reference, WholeTurns};
+use mimu::{Judgement, NoiseFile, Prepared, STANDARD_GRAVITY, Sensor, Warning, normal_gravity};
+use mimu_recording::{Argument, Error, Reference, Result, WholeTurns};
 use mimu_wizard::procedure::Targets;
 
 use crate::overwriting::check_overwritten;
@@ -25,28 +20,18 @@ pub(crate) struct StillArgs {
     #[arg(long = "still", value_name = "FACTOR", default_value_t = STILL_FACTOR, value_parser = |t: &str| number(t, 1.0, 1e9))]
     pub(crate) factor: f64,
     /// Where dwells come from: given by the column step, or found by stillness [default: the column if there is one]
-    #[arg(long = "steps", value_enum, value_name = "WHENCE")]
-    pub(crate) steps: Option<StepsArg>,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-pub(crate) enum StepsArg {
-    /// From the column step, without a test for stillness
-    Given,
-    /// By stillness; the column step is ignored
-    Found,
+    #[arg(long = "steps", value_name = "WHENCE", value_parser = choice(&[
+        ("given", "From the column step, without a test for stillness", Steps::Given),
+        ("found", "By stillness; the column step is ignored", Steps::Found),
+    ]))]
+    pub(crate) steps: Option<Steps>,
 }
 
 impl StillArgs {
     pub(crate) fn search(&self) -> DwellSearch {
-        let steps = match self.steps {
-            None => Steps::AsRecorded,
-            Some(StepsArg::Given) => Steps::Given,
-            Some(StepsArg::Found) => Steps::Found,
-        };
         DwellSearch {
             still_factor: self.factor,
-            steps,
+            steps: self.steps.unwrap_or_default(),
         }
     }
 }
@@ -277,20 +262,20 @@ impl JsonArgs {
     }
 }
 
-#[derive(Clone, Copy, ValueEnum)]
-pub(crate) enum SensorArg {
-    Gyro,
-    Accel,
+/// Takes one of these words, each with its help and what it chooses: the types that it chooses from belong to crates without a command line.
+pub(crate) fn choice<T: Copy + Send + Sync>(
+    all: &'static [(&'static str, &'static str, T)],
+) -> impl TypedValueParser<Value = T> {
+    let value = |(word, help, _): &(&'static str, &'static str, T)| {
+        PossibleValue::new(word).help((!help.is_empty()).then_some(*help))
+    };
+    let words = PossibleValuesParser::new(all.iter().map(value));
+    words.map(|word| all.iter().find(|of| of.0 == word).unwrap_or(&all[0]).2)
 }
 
-impl SensorArg {
-    /// The sensor.
-    pub(crate) fn sensor(self) -> Sensor {
-        match self {
-            Self::Gyro => Sensor::Gyro,
-            Self::Accel => Sensor::Accel,
-        }
-    }
+/// A sensor by its name.
+pub(crate) fn sensor() -> impl TypedValueParser<Value = Sensor> {
+    choice(&[("gyro", "", Sensor::Gyro), ("accel", "", Sensor::Accel)])
 }
 
 /// Gravity, m/s², as given or of the latitude, and what is said of it where no height explains it; `None` if neither is given.

@@ -6,8 +6,7 @@ use std::sync::mpsc::Receiver;
 
 use clap::{Args, CommandFactory, Parser};
 use mimu_export::{Choice, Export, Sources};
-use mimu_recording::ImportSummary;
-use mimu_recording::error::Error;
+use mimu_recording::{Error, ImportSummary};
 use mimu_wizard::event::View;
 use mimu_wizard::relay::Stamped;
 use mimu_wizard::session::Outcome;

@@ -342,13 +342,8 @@ pub(crate) fn imported(mut args: ImportArgs) -> Result<(ImportSummary, ImportOpt
         Some(chosen) => options.with_preset(chosen),
         None => options,
     };
-    let inputs: Vec<&Path> = options
-        .files
-        .iter()
-        .chain(&options.log.inputs)
-        .map(|p| p.as_path())
-        .collect();
-    check_outputs(&[args.json.file()], &inputs)?;
+    let inputs = options.files.iter().chain(&options.log.inputs);
+    check_outputs(&[args.json.file()], inputs)?;
     let arguments = options.arguments();
     let bar = progress("importing");
     let mut summary = import(&options, &args.output, |share| bar.reach(share))?;

@@ -4,8 +4,7 @@ use std::path::{Path, PathBuf};
 
 use mimu::calibration::Calibration;
 use mimu_export::foreign::{self, Foreign};
-use mimu_recording::RawUnit;
-use mimu_recording::error::{Error, Result};
+use mimu_recording::{Error, RawUnit, Result};
 
 /// A calibration as its file has it.
 pub(crate) enum Opened {

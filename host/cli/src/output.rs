@@ -22,11 +22,12 @@ pub(crate) fn json_printed() -> bool {
 }
 
 /// Before the work, refuses outputs that cannot be written, and those that would overwrite an input or each other.
-pub(crate) fn check_outputs(outputs: &[Option<&Path>], inputs: &[&Path]) -> Result<()> {
-    let mut taken: Vec<PathBuf> = inputs
-        .iter()
-        .filter_map(|p| p.canonicalize().ok())
-        .collect();
+pub(crate) fn check_outputs(
+    outputs: &[Option<&Path>],
+    inputs: impl IntoIterator<Item: AsRef<Path>>,
+) -> Result<()> {
+    let inputs = inputs.into_iter();
+    let mut taken: Vec<_> = inputs.flat_map(|p| p.as_ref().canonicalize()).collect();
     for path in outputs.iter().flatten() {
         // Dropped at once: only tests that the folder is writable.
         let folder = stage(path, String::new())?.folder();

@@ -5,8 +5,7 @@ use std::sync::atomic::Ordering;
 use std::sync::{Mutex, PoisonError};
 
 use clap::Args;
-use mimu::prepared::Prepared;
-use mimu::signal::stillness::DwellSearch;
+use mimu::{DwellSearch, Prepared};
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{ImportOptions, LogOptions, MANIFEST_FILE, PoseMeans, Recording};
 use tempfile::TempDir;
@@ -117,7 +116,7 @@ pub(crate) fn remove_logs() {
     LOGS.lock().unwrap_or_else(PoisonError::into_inner).clear();
 }
 
-/// Reads a recording of samples or of means like [`read`]; with the recording, if it is one of samples.
+/// Reads a recording of samples or of means like [`read_samples`]; with the recording, if it is one of samples.
 pub(crate) fn read_with_samples(
     directory: &Path,
     log: &LogArgs,
@@ -137,17 +136,6 @@ pub(crate) fn read_with_samples(
 }
 
 /// Reads a recording, after checking that the results can be written and overwrite no input.
-pub(crate) fn read(
-    directory: &Path,
-    log: &LogArgs,
-    search: DwellSearch,
-    outputs: &[Option<&Path>],
-    others: &[Option<&Path>],
-) -> Result<Prepared> {
-    Ok(read_samples(directory, log, search, outputs, others)?.0)
-}
-
-/// As [`read`], with the recording.
 pub(crate) fn read_samples(
     directory: &Path,
     log: &LogArgs,
@@ -156,23 +144,12 @@ pub(crate) fn read_samples(
     others: &[Option<&Path>],
 ) -> Result<(Prepared, Recording)> {
     let recording = open(directory, log)?;
-    let prepared = read_opened(&recording, directory, search, outputs, others)?;
-    Ok((prepared, recording))
-}
-
-fn read_opened(
-    recording: &Recording,
-    directory: &Path,
-    search: DwellSearch,
-    outputs: &[Option<&Path>],
-    others: &[Option<&Path>],
-) -> Result<Prepared> {
     let manifest = recording.directory.join(MANIFEST_FILE);
     let mut inputs: Vec<&Path> = vec![&manifest, &recording.samples, directory];
     inputs.extend(others.iter().flatten());
     check_outputs(outputs, &inputs)?;
     let bar = progress("reading");
-    let prepared = Prepared::read(recording, search, |share| bar.reach(share));
+    let prepared = Prepared::read(&recording, search, |share| bar.reach(share));
     bar.finish();
-    prepared
+    Ok((prepared?, recording))
 }

@@ -13,8 +13,7 @@ use super::image::{Image, effects_of};
 use super::received::{Event, Samples};
 use super::session::Session;
 use host_reference::HostReference;
-use mimu::calibration::Calibration;
-use mimu::quantity::Sensor;
+use mimu::{Calibration, Sensor};
 use mimu_recording::error::{Error, Result};
 
 pub use host_reference::rounding;

@@ -10,8 +10,7 @@ use super::identity::{Hash, Identity};
 use super::origin;
 use mimu::calibration::{Calibration, DeviceCalibration};
 use mimu::quantity::{PerSensor, Sensor};
-use mimu_recording::RawUnit;
-use mimu_recording::error::{Error, Result};
+use mimu_recording::{Error, RawUnit, Result};
 
 /// A stored calibration, number by number: the result of `mimu device download`.
 #[derive(Debug, Clone, PartialEq, Serialize)]

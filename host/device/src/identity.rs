@@ -14,8 +14,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::origin;
 use super::reading::shortest;
 use mimu::quantity::PerSensor;
-use mimu_recording::error::{Error, Result};
-use mimu_recording::{RawUnit, SensorSetting, SensorSettings};
+use mimu_recording::{Error, RawUnit, Result, SensorSetting, SensorSettings};
 
 /// An owned copy of a [`Greeting`]: the result of `mimu device info`.
 #[derive(Debug, Clone, PartialEq, Serialize)]

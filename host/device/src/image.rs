@@ -12,8 +12,7 @@ use super::origin;
 use mimu::calibration::{Calibration, OverTemperature, reference_node};
 use mimu::effects::fitted::NotOnDevice;
 use mimu::quantity::{PerSensor, Sensor};
-use mimu_recording::RawUnit;
-use mimu_recording::error::{Argument, Error, Result};
+use mimu_recording::{Argument, Error, RawUnit, Result};
 
 /// A calibration as the device stores it.
 #[derive(Debug, Clone, PartialEq)]

@@ -292,10 +292,7 @@ impl<'a> BankRun<'a> {
         let device = estimates(last);
         let distance_sigma = distances(&device, &host);
         let raw = &self.session.who().raw_unit;
-        let input_unit = match plan.sensor {
-            Sensor::Gyro => "rad/s",
-            Sensor::Accel => "m/s²",
-        };
+        let input_unit = plan.sensor.pick("rad/s", "m/s²");
         let scale = || format!("{raw}/({input_unit})");
         let converging = |report: &KalmanState| Converging {
             updates: report.updates,

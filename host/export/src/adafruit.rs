@@ -10,8 +10,7 @@
 use std::fmt::Write as _;
 
 use clap::{Args, ValueEnum};
-use mimu::calibration::Calibration;
-use mimu::quantity::Sensor;
+use mimu::{Calibration, Sensor};
 use mimu_recording::error::Result;
 use serde_json::{Map, Value, json};
 

@@ -14,8 +14,7 @@
 //! libraries/AP_Compass/AP_Compass_Backend.cpp, `correct_field`; AP_Compass.cpp for names and units; CompassCalibrator.cpp, `fit_acceptable`, for ranges.
 
 use mimu::quantity::Sensor;
-use mimu_recording::TriadKind;
-use mimu_recording::error::{Argument, Result};
+use mimu_recording::{Argument, Result, TriadKind};
 use nalgebra::Matrix3;
 
 use crate::convention::{Bias, Convention, Shape};
@@ -251,8 +250,5 @@ fn further(of: &FurtherTriad, export: &mut Export) -> Result<()> {
 
 /// Short name of a sensor in parameter names.
 fn short(sensor: Sensor) -> &'static str {
-    match sensor {
-        Sensor::Gyro => "GYR",
-        Sensor::Accel => "ACC",
-    }
+    sensor.pick("GYR", "ACC")
 }

@@ -8,11 +8,9 @@
 //! 1: enough for directions, and no gauss.
 
 use clap::Args;
-use mimu::calibration::Calibration;
 use mimu::calibration::bias_cubic::KnownConversion;
-use mimu::calibration::body::BodyTriad;
-use mimu_recording::error::{Error, Result};
-use mimu_recording::{RawUnit, TriadKind, TriadName};
+use mimu::{BodyTriad, Calibration};
+use mimu_recording::{Error, RawUnit, Result, TriadKind, TriadName};
 use nalgebra::{Matrix3, Rotation3};
 
 use crate::Export;

@@ -12,9 +12,7 @@
 mod effects;
 
 use clap::Args;
-use mimu::calibration::Calibration;
-use mimu::calibration::body::BodyTriad;
-use mimu::quantity::Sensor;
+use mimu::{BodyTriad, Calibration, Sensor};
 use mimu_core::compensation::Affine;
 use mimu_core::die::{BEYOND_C, RATE_SHARE};
 use mimu_core::effects::REFERENCE_C;
@@ -190,10 +188,10 @@ impl Header<'_> {
     fn sensor(&self, sensor: Sensor) -> Option<Value> {
         let model = self.calibration.inverse(sensor)?;
         let table = self.calibration.table(sensor)?;
-        let (raw, own, own_unit) = match sensor {
-            Sensor::Gyro => ("g", "rate", "rad/s"),
-            Sensor::Accel => ("a", "force", "m/s^2, at rest it points up"),
-        };
+        let (raw, own, own_unit) = sensor.pick(
+            ("g", "rate", "rad/s"),
+            ("a", "force", "m/s^2, at rest it points up"),
+        );
         Some(json!({
             "sensor": sensor.name(),
             "raw": raw,

@@ -13,8 +13,7 @@
 
 use mimu::quantity::AXES;
 use mimu_core::compensation::Affine;
-use mimu_recording::TriadName;
-use mimu_recording::error::{Argument, Error, Result};
+use mimu_recording::{Argument, Error, Result, TriadName};
 use nalgebra::{Matrix3, Vector3};
 
 use crate::driver::Readings;

@@ -2,8 +2,7 @@
 
 use mimu::calibration::Calibration;
 use mimu_device::Image;
-use mimu_recording::UNNAMED;
-use mimu_recording::error::Result;
+use mimu_recording::{Result, UNNAMED};
 
 use crate::format::Whole;
 use crate::{Export, Nothing, Page, Sources, Target};

@@ -4,13 +4,10 @@
 //! a calibration file applies to the raw readings u.
 
 use clap::Args;
-use mimu::calibration::Calibration;
 use mimu::calibration::bias_cubic::{Conversion, KnownConversion};
-use mimu::quantity::{PerSensor, Sensor};
-use mimu::triad::Forward;
+use mimu::{Calibration, Forward, PerSensor, Sensor};
 use mimu_core::compensation::Affine;
-use mimu_recording::error::{Argument, Error, Result};
-use mimu_recording::{RawUnit, TriadName};
+use mimu_recording::{Argument, Error, RawUnit, Result, TriadName};
 use nalgebra::{Matrix3, Vector3};
 
 use crate::Sources;
@@ -90,10 +87,7 @@ impl Options {
         if raw == RawUnit::Si || self.conversions()[sensor].si_per_raw.is_some() {
             return Ok(());
         }
-        let argument = match sensor {
-            Sensor::Gyro => Argument::GyroConversion,
-            Sensor::Accel => Argument::AccelConversion,
-        };
+        let argument = sensor.pick(Argument::GyroConversion, Argument::AccelConversion);
         Err(Error::new(
             sensor,
             format!("its scale factors are errors of the driver's factor, which is not given: the readings are in {raw}"),
@@ -136,10 +130,7 @@ impl Options {
 
 /// The first triad of a kind.
 pub(crate) fn name_of(sensor: Sensor) -> TriadName {
-    match sensor {
-        Sensor::Gyro => TriadName::GYRO,
-        Sensor::Accel => TriadName::ACCEL,
-    }
+    sensor.pick(TriadName::GYRO, TriadName::ACCEL)
 }
 
 /// Raw readings of `sensor`, for programs that take them.

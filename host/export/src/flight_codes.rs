@@ -4,10 +4,8 @@
 
 use std::fmt::Display;
 
-use mimu::quantity::{AXES, Sensor};
-use mimu::readable::STANDARD_GRAVITY;
-use mimu_recording::error::{Argument, Result};
-use mimu_recording::{RawUnit, TriadName};
+use mimu::{AXES, STANDARD_GRAVITY, Sensor};
+use mimu_recording::{Argument, RawUnit, Result, TriadName};
 use nalgebra::Vector3;
 
 use crate::convention::{Convention, within};

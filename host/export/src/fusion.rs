@@ -11,9 +11,7 @@
 
 use std::fmt::Write as _;
 
-use mimu::calibration::Calibration;
-use mimu::quantity::Sensor;
-use mimu::readable::STANDARD_GRAVITY;
+use mimu::{Calibration, STANDARD_GRAVITY, Sensor};
 use mimu_recording::error::Result;
 
 use crate::convention::{Bias, Convention, Shape};

@@ -1,8 +1,6 @@
 //! Comments at the head of every file: the calibrated unit, the formula, and the remaining errors.
 
-use mimu::calibration::Calibration;
-use mimu::noise::noise_file::NoiseFile;
-use mimu::quantity::Sensor;
+use mimu::{Calibration, NoiseFile, Sensor};
 
 use crate::judged::JudgedSource;
 use crate::{Export, Noise, Sources, body};

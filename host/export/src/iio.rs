@@ -12,8 +12,7 @@
 
 use std::fmt::Write as _;
 
-use mimu::quantity::{PerSensor, Sensor};
-use mimu::readable::STANDARD_GRAVITY;
+use mimu::{PerSensor, STANDARD_GRAVITY, Sensor};
 use mimu_recording::error::{Argument, Result};
 
 use crate::biases::biases;
@@ -75,10 +74,7 @@ impl Target for Iio {
         let missing = "its calibbias stays unchanged";
         for (entry, parts) in biases::<Self>(options, from, missing, &mut export)? {
             let sensor = entry.sensor;
-            let argument = match sensor {
-                Sensor::Gyro => Argument::GyroZero,
-                Sensor::Accel => Argument::AccelZero,
-            };
+            let argument = sensor.pick(Argument::GyroZero, Argument::AccelZero);
             let rounding = Remaining::of_rounding(sensor, STEP[sensor]);
             export.remaining.push(rounding);
             let _ = writeln!(body, "find_device \"${{1:-i[ci]m4*}}-{sensor}\"");

@@ -3,8 +3,7 @@
 //! Readings are those of a [driver]: `y = P x + b`, SI to SI. `P = T R` with T triangular and R a rotation is the exact counterpart of a QR
 //! factorisation: scale factors and non-orthogonality are in T, the misalignment of the package is in R.
 
-use mimu::calibration::Calibration;
-use mimu::quantity::{PerSensor, Sensor};
+use mimu::{Calibration, PerSensor, Sensor};
 use mimu_recording::error::Result;
 use nalgebra::{Matrix3, Vector3};
 

@@ -2,8 +2,7 @@
 
 use mimu::calibration::bias_cubic::BiasCubics;
 use mimu::calibration::{Calibration, TriadTable};
-use mimu::judgement::Judgement;
-use mimu::quantity::Sensor;
+use mimu::{Judgement, Sensor};
 use serde::Serialize;
 
 use crate::Sources;

@@ -78,9 +78,8 @@ pub mod vins;
 pub mod worst_axis;
 pub mod yaml;
 
-use mimu::calibration::Calibration;
 use mimu::calibration::bias_cubic::BiasCubics;
-use mimu::noise::noise_file::NoiseFile;
+use mimu::{Calibration, NoiseFile};
 use serde::Serialize;
 
 pub use crate::format::{Choice, Format, Noise, Nothing, Page, Target};

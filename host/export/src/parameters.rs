@@ -8,11 +8,8 @@ use std::fmt::Write as _;
 
 use clap::Args;
 use mimu::calibration::bias_cubic::{BiasCubics, Conversion};
-use mimu::calibration::body::BodyTriad;
-use mimu::quantity::{PerSensor, Sensor};
-use mimu::triad::Forward;
-use mimu_recording::error::{Argument, Result};
-use mimu_recording::{RawUnit, TriadKind, TriadName};
+use mimu::{BodyTriad, Forward, PerSensor, Sensor};
+use mimu_recording::{Argument, RawUnit, Result, TriadKind, TriadName};
 use nalgebra::{Matrix3, Vector3};
 use serde::Serialize;
 

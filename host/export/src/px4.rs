@@ -14,8 +14,7 @@
 
 use mimu::calibration::bias_cubic::BiasCubics;
 use mimu::quantity::Sensor;
-use mimu_recording::TriadKind;
-use mimu_recording::error::{Argument, Result};
+use mimu_recording::{Argument, Result, TriadKind};
 
 use crate::convention::{Bias, Convention, Shape};
 use crate::layout::{Entry, Numbers};
@@ -196,10 +195,7 @@ fn further(options: &Options, from: &Sources, export: &mut Export) -> Result<()>
 }
 
 fn parameters_of(cubics: &BiasCubics, n: u8, id: Option<i32>, out: &mut Vec<Parameter>) {
-    let letter = match cubics.sensor {
-        Sensor::Gyro => 'G',
-        Sensor::Accel => 'A',
-    };
+    let letter = cubics.sensor.pick('G', 'A');
     let prefix = format!("TC_{letter}{n}");
     out.push(Parameter::int32(format!("TC_{letter}_ENABLE"), 1));
     out.extend(id.map(|id| Parameter::int32(format!("{prefix}_ID"), id)));

@@ -5,10 +5,7 @@
 
 use mimu::calibration::bias_cubic::BiasCubics;
 use mimu::calibration::{Calibration, compensator};
-use mimu::effects::fitted::FittedEffect;
-use mimu::quantity::Sensor;
-use mimu::readable;
-use mimu::triad::Forward;
+use mimu::{FittedEffect, Forward, Sensor, readable};
 use mimu_core::compensation::{Affine, Compensation, Sample};
 use mimu_core::compensator::Compensator;
 use mimu_core::effects::{Effects, REFERENCE_C};
@@ -166,10 +163,7 @@ fn input(sensor: Sensor) -> f64 {
 }
 
 fn at_input(sensor: Sensor) -> &'static str {
-    match sensor {
-        Sensor::Gyro => "at 100 deg/s",
-        Sensor::Accel => "at 1 g",
-    }
+    sensor.pick("at 100 deg/s", "at 1 g")
 }
 
 /// Inputs along both directions of every axis.
@@ -296,10 +290,7 @@ pub(crate) fn effects(calibration: &Calibration) -> Vec<Remaining> {
         let Some(full) = alone() else {
             return Remaining::unknown(sensor, &id, "this program cannot evaluate it");
         };
-        let condition = match sensor {
-            Sensor::Gyro => "at up to 100 deg/s and 1 g",
-            Sensor::Accel => "at up to 1 g",
-        };
+        let condition = sensor.pick("at up to 100 deg/s and 1 g", "at up to 1 g");
         let errors = of_effect(&full, &models, sensor, limits);
         Remaining::new(sensor, &id, condition, &errors)
     };

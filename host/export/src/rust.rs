@@ -6,16 +6,14 @@
 //! a change of the calibration is visible as a change of its numbers. Every `f32` is written as the shortest decimal number that equals it, so that
 //! results match the device's to the last bit.
 
-use mimu::calibration::body::BodyTriad;
 use mimu::calibration::{Calibration, DeviceCalibration, reference_node};
-use mimu::quantity::{PerSensor, Sensor};
+use mimu::{BodyTriad, PerSensor, Sensor};
 use mimu_core::compensation::{Affine, Compensation};
 use mimu_core::effects::{DeviceEffect, Directions, Variable};
 use mimu_core::stored;
 use mimu_core::table::Node;
 use mimu_device::Image;
-use mimu_recording::error::{Error, Result};
-use mimu_recording::{RawUnit, UNNAMED};
+use mimu_recording::{Error, RawUnit, Result, UNNAMED};
 use nalgebra::{Matrix3, Vector3};
 use serde_json::{Value, json};
 

@@ -1,11 +1,9 @@
 //! What an export is made from.
 
-use mimu::calibration::Calibration;
 use mimu::calibration::thermal_biases::ThermalBiases;
 use mimu::noise::noise_file::{NoiseChannel, NoiseFile};
-use mimu::quantity::{Sensor, significant};
-use mimu_recording::error::{Argument, Error, Result};
-use mimu_recording::{RAW_COLUMNS, RawUnit};
+use mimu::{Calibration, Sensor, significant};
+use mimu_recording::{Argument, Error, RAW_COLUMNS, RawUnit, Result};
 
 /// Largest share by which a scale factor may differ from 1 without a consequence: that of N is rarely known better.
 const SAME_SCALE: f64 = 0.03;

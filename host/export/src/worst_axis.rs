@@ -8,8 +8,7 @@
 
 use clap::Args;
 use mimu::noise::noise_file::{NoiseChannel, NoiseFile};
-use mimu::quantity::{AXES, PerSensor, Sensor};
-use mimu::readable::STANDARD_GRAVITY;
+use mimu::{AXES, PerSensor, STANDARD_GRAVITY, Sensor};
 use mimu_allan::model::Term;
 use mimu_recording::error::{Argument, Error, Result};
 
@@ -188,10 +187,7 @@ impl WalkOptions {
         name: &str,
         gain: &[f64; 3],
     ) -> Result<Densities> {
-        let walk = match sensor {
-            Sensor::Gyro => self.gyro_walk,
-            Sensor::Accel => self.accel_walk,
-        };
+        let walk = sensor.pick(self.gyro_walk, self.accel_walk);
         let of = |term, given| worst(noise, channels, name, (sensor, term), given, gain);
         Ok(Densities {
             white: of(Term::N, None)?,

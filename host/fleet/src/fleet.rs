@@ -3,10 +3,8 @@
 use std::collections::{BTreeMap, HashMap};
 
 use mimu::data_sheet::{Part, Row};
-use mimu::prior::Prior;
-use mimu::quantity::Sensor;
 use mimu::sessions::contradiction::FALSE_FINDING;
-use mimu::{Error, RawUnit, Reference};
+use mimu::{Error, Prior, RawUnit, Reference, Sensor};
 
 use crate::capability;
 use crate::charts;

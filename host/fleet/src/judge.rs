@@ -1,7 +1,6 @@
 //! The judgement of a fleet.
 
-use mimu::quantity::plural;
-use mimu::{Judgement, JudgementKind};
+use mimu::{Judgement, JudgementKind, plural};
 
 use crate::result::Fleet;
 

@@ -1,12 +1,9 @@
 //! The parameters of calibrations, in units that a fleet has in common.
 
-use mimu::calibration::Calibration;
 use mimu::nalgebra::{DMatrix, DVector, SVector};
-use mimu::parameter::{ParameterKind, TriadParameter};
-use mimu::quantity::Sensor;
 use mimu::sessions::between::Estimates;
 use mimu::triad::{Covariance, Part, Triad};
-use mimu::{PerSensor, RawUnit};
+use mimu::{Calibration, ParameterKind, PerSensor, RawUnit, Sensor, TriadParameter};
 use mimu_recording::Reference;
 
 /// How the name of an estimator ends that has used a prior.

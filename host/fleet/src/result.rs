@@ -2,8 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use mimu::quantity::Sensor;
-use mimu::{Judgement, PerSensor};
+use mimu::{Judgement, PerSensor, Sensor};
 use serde::Serialize;
 
 use crate::capability::Capability;

@@ -3,9 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use jiff::civil::Date;
-use mimu::Error;
-use mimu::calibration::Calibration;
 use mimu::data_sheet::{DataSheet, Part, Row};
+use mimu::{Calibration, Error};
 use mimu_recording::{UNNAMED, text_columns};
 use rayon::prelude::*;
 

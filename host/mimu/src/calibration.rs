@@ -40,16 +40,15 @@ use crate::judgement::Judgement;
 use crate::quantity::{Sensor, significant};
 use crate::triad::Covariance;
 use crate::warning::Warning;
-use mimu_recording::error::Result;
 use mimu_recording::{
-    ClockRate, Manifest, RawUnit, Reference, SensorSettings, UNNAMED, are_two_units, check_kind,
-    parse_toml, read_text,
+    ClockRate, Manifest, RawUnit, Reference, Result, SensorSettings, UNNAMED, are_two_units,
+    check_kind, parse_toml, read_text,
 };
 
 /// Relative difference of two ranges that are the same.
 const SAME_RANGE: f64 = 0.01;
 /// Program and version, as results name them.
-pub(crate) const TOOL: &str = concat!("mimu ", env!("CARGO_PKG_VERSION"));
+pub const TOOL: &str = concat!("mimu ", env!("CARGO_PKG_VERSION"));
 /// Version of the layout of a calibration at one temperature.
 const FORMAT: &str = "mimu-calibration/1";
 /// Version of the layout with curves over temperature. A program that does not know curves refuses it, instead of applying the one model.
@@ -444,10 +443,7 @@ impl Calibration {
 
     /// The table of `sensor`.
     pub fn table(&self, sensor: Sensor) -> Option<&TriadTable> {
-        match sensor {
-            Sensor::Gyro => self.gyro.as_ref(),
-            Sensor::Accel => self.accel.as_ref(),
-        }
+        sensor.pick(self.gyro.as_ref(), self.accel.as_ref())
     }
 
     /// Whether it contains standard deviations. One that was fetched from a device does not.

@@ -35,9 +35,8 @@ use crate::turntable::RatedDwells;
 use crate::unseen::{Test, Unseen};
 use crate::warning::Warning;
 use mimu_core::PerSensor;
-use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::units::median;
-use mimu_recording::{RawUnit, Reference};
+use mimu_recording::{Argument, Error, RawUnit, Reference, Result};
 
 use crate::observable::Observable;
 use by_gravity::{fit_gravity, with_priors};

@@ -137,9 +137,8 @@ pub use judgement::{Judgement, JudgementKind};
 pub use judging::known_size;
 pub use mimu_core::PerSensor;
 pub use mimu_core::compensation::Affine;
-pub use mimu_recording::error::Error;
 pub use mimu_recording::{
-    Batch as Samples, Manifest, RawUnit, Recording, Reference, SampleFormat, Turntable,
+    Batch as Samples, Error, Manifest, RawUnit, Recording, Reference, SampleFormat, Turntable,
 };
 pub use nalgebra;
 pub use noise::noise_file::NoiseFile;
@@ -152,3 +151,17 @@ pub use signal::stillness::DwellSearch;
 pub use survey::{Options as AllanOptions, Part, Survey, survey as allan};
 pub use triad::{Angles, Estimate, Forward, Physical, Triad};
 pub use warning::Warning;
+
+// What the other crates of the host use of the modules above.
+#[doc(hidden)]
+pub use {
+    calibration::body::BodyTriad,
+    data_sheet::DataSheet,
+    parameter::{ParameterKind, TriadParameter},
+    prior::Prior,
+    quantity::{AXES, Figure, duration, normal_gravity, plural, plus_minus, significant},
+    readable::{Readable, STANDARD_GRAVITY},
+    recording_problem::OfRecording,
+    result::{diagnosis::DiagnosisResult, fit::FitResult},
+    signal::dwell::Dwell,
+};

@@ -23,8 +23,7 @@ use crate::signal::ramp::ramps;
 use crate::triad::Covariance;
 use crate::warning::Warning;
 use mimu_allan::variance::AllanModel;
-use mimu_recording::error::{Error, Result};
-use mimu_recording::{Manifest, RAW_COLUMNS, RawUnit, are_two_units};
+use mimu_recording::{Error, Manifest, RAW_COLUMNS, RawUnit, Result, are_two_units};
 
 /// Noise of one raw channel from a record at rest, at one temperature or several (fang, Table 5).
 #[derive(Debug, Clone, PartialEq)]

@@ -1,7 +1,6 @@
 //! Whether recordings belong to one unit and were recorded alike.
 
-use mimu_recording::error::{Error, Result};
-use mimu_recording::{Manifest, are_two_units};
+use mimu_recording::{Error, Manifest, Result, are_two_units};
 
 /// A key of a manifest, and its value as a person reads it.
 pub(crate) type Setting = (&'static str, fn(&Manifest) -> String);

@@ -13,8 +13,7 @@ use std::time::Duration;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use mimu_recording::error::{Argument, Error, Result};
-use mimu_recording::{check_kind, parse_toml, read_text};
+use mimu_recording::{Argument, Error, Result, check_kind, parse_toml, read_text};
 
 use crate::plan::design::model::Setting;
 use crate::plan::design::reach::Fixture;
@@ -35,19 +34,14 @@ const PARALLEL: f64 = 1.5e-8;
 pub struct Plan {
     format: String,
     /// Name of the unit.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub device: Option<String>,
     sample_rate_hz: f64,
-    #[serde(skip_serializing_if = "Option::is_none")]
     samples: Option<String>,
     carrier: Carrier,
-    #[serde(skip_serializing_if = "Option::is_none")]
     steps: Option<bool>,
     /// Latitude, degrees.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub latitude_deg: Option<f64>,
     /// Local gravity, m/s².
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub gravity_mps2: Option<f64>,
     /// Course of the chamber, s and °C; empty where it does not matter.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -59,7 +53,6 @@ pub struct Plan {
     #[serde(default = "once", skip_serializing_if = "is_once")]
     pub rounds: u32,
     /// From the beginning of a round to that of the next, s; without it they follow each other.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub round_s: Option<f64>,
     /// Entries of a round.
     pub step: Vec<Step>,
@@ -76,9 +69,7 @@ enum Carrier {
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Step {
-    #[serde(skip_serializing_if = "Option::is_none")]
     up: Option<[f64; 3]>,
-    #[serde(skip_serializing_if = "Option::is_none")]
     poses: Option<u32>,
     #[serde(default, skip_serializing_if = "is_zero")]
     heading_deg: f64,
@@ -88,13 +79,9 @@ pub struct Step {
     spin_dps: f64,
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     stay: bool,
-    #[serde(skip_serializing_if = "Option::is_none")]
     turn_axis: Option<TableAxis>,
-    #[serde(skip_serializing_if = "Option::is_none")]
     turn_deg: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
     turn_dps: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
     dwell_s: Option<f64>,
     #[serde(default = "once", skip_serializing_if = "is_once")]
     repeat: u32,

@@ -10,8 +10,7 @@ use crate::signal::blocks::{Block, Condensed, Level, Moments};
 use crate::signal::dwell::{Dwell, Dwells, Fault, Keep, Mean};
 use crate::signal::jump::Jump;
 use crate::warning::Warning;
-use mimu_recording::error::Result;
-use mimu_recording::{Column, PoseMean, PoseMeans, Reference};
+use mimu_recording::{Column, PoseMean, PoseMeans, Reference, Result};
 
 impl Prepared {
     /// The dwells of a table of means, ready for [`fit`](fn@crate::fit::fit) and for nothing else.

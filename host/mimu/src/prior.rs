@@ -15,8 +15,7 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use crate::parameter::TriadParameter;
 use crate::quantity::{PerSensor, Sensor, raw_unit, scale_unit};
 use crate::triad::{Triad, physical_of};
-use mimu_recording::error::{Error, Result};
-use mimu_recording::{RawUnit, Reference, check_kind, parse_toml, read_text};
+use mimu_recording::{Error, RawUnit, Reference, Result, check_kind, parse_toml, read_text};
 
 /// Version of the file.
 const FORMAT: &str = "mimu-prior/1";
@@ -155,10 +154,7 @@ impl Prior {
 
     /// The table of a triad.
     pub fn table(&self, sensor: Sensor) -> Option<&PriorTable> {
-        match sensor {
-            Sensor::Gyro => self.gyro.as_ref(),
-            Sensor::Accel => self.accel.as_ref(),
-        }
+        sensor.pick(self.gyro.as_ref(), self.accel.as_ref())
     }
 
     /// Sensors and numbers of units: `gyro of 60 units, accel of 60 units`. Empty if it has no table.

@@ -81,9 +81,7 @@ impl Seen {
     /// Kind of `warning`, if it is about a problem of the recording.
     fn of(warning: &Warning) -> Option<Self> {
         Some(match warning {
-            Warning::Of { warning, .. } | Warning::Channel { warning, .. } => {
-                return Self::of(warning);
-            }
+            Warning::Of(_, warning) | Warning::Channel(_, warning) => return Self::of(warning),
             Warning::CalibrationOfOther { .. } | Warning::NoisierThanGyros { .. } => Self::Unit,
             Warning::Health(finding) => Self::of_finding(finding.fault)?,
             Warning::Clipped { .. }

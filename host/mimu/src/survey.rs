@@ -31,9 +31,8 @@ use mimu_allan::model::{
 };
 use mimu_allan::spectrum::Lines;
 use mimu_allan::{Deviation, NotFinite, Point, Spacing};
-use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::health::{At, Finding, Temperatures};
-use mimu_recording::{Column, RAW_COLUMNS, RawUnit, Recording};
+use mimu_recording::{Argument, Column, Error, RAW_COLUMNS, RawUnit, Recording, Result};
 
 /// What to compute.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -441,10 +440,7 @@ impl Channel {
             (None, Some(share)) => Warning::Drifts { share, longest_s },
             (None, None) => return,
         };
-        warnings.push(Warning::Channel {
-            channel: self.name,
-            warning: Box::new(warning),
-        });
+        warnings.push(Warning::Channel(self.name, Box::new(warning)));
         if options.kind != Deviation::Hadamard {
             let times = Spacing::PerDecade(options.per_decade);
             self.hadamard = Some(integrated.curve(Deviation::Hadamard, &times, options.confidence));

@@ -14,8 +14,7 @@ use crate::prepared::{Prepared, si_covariance};
 use crate::quantity::{Sensor, significant};
 use crate::signal::dwell::Fault;
 use crate::warning::Warning;
-use mimu_recording::error::{Argument, Error, Result};
-use mimu_recording::{NORMAL_95, RawUnit, Turntable};
+use mimu_recording::{Argument, Error, NORMAL_95, RawUnit, Result, Turntable};
 
 /// Expected standard deviation of a reading at rest over the largest rate, by the wander of the bias; and of a reading at a rate over that rate, by scale
 /// factors that differ from axis to axis.

@@ -7,9 +7,8 @@ use words::{degrees, off, open};
 use std::fmt::Display;
 use std::mem::discriminant;
 
-use mimu_recording::error::Error;
 use mimu_recording::health::Finding;
-use mimu_recording::{ClockRate, RAW_COLUMNS, RawUnit, TriadName};
+use mimu_recording::{ClockRate, Error, RAW_COLUMNS, RawUnit, TriadName};
 use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
 
@@ -33,23 +32,14 @@ const RATES_HZ: std::ops::RangeInclusive<f64> = 1.0..=40e3;
 #[strum(serialize_all = "snake_case")]
 pub enum Warning {
     /// One about a sensor.
-    #[error("{sensor}: {warning}")]
-    Of {
-        sensor: Sensor,
-        warning: Box<Warning>,
-    },
+    #[error("{0}: {1}")]
+    Of(Sensor, Box<Warning>),
     /// One about a channel.
-    #[error("{channel}: {warning}")]
-    Channel {
-        channel: &'static str,
-        warning: Box<Warning>,
-    },
+    #[error("{0}: {1}")]
+    Channel(&'static str, Box<Warning>),
     /// One about a recording of several.
-    #[error("{recording}: {warning}")]
-    In {
-        recording: String,
-        warning: Box<Warning>,
-    },
+    #[error("{0}: {1}")]
+    In(String, Box<Warning>),
     /// A warning from reading a recording.
     #[error("{0}")]
     Reading(mimu_recording::Warning),
@@ -562,16 +552,13 @@ pub enum Warning {
 impl Warning {
     /// This warning, about `sensor`.
     pub(crate) fn of(self, sensor: Sensor) -> Self {
-        Self::Of {
-            sensor,
-            warning: Box::new(self),
-        }
+        Self::Of(sensor, Box::new(self))
     }
 
     /// Its name: that of the variant, in small letters. Scripts rely on it, but not on the sentence.
     pub fn kind(&self) -> &'static str {
         match self {
-            Self::Of { warning, .. } | Self::Channel { warning, .. } | Self::In { warning, .. } => {
+            Self::Of(_, warning) | Self::Channel(_, warning) | Self::In(_, warning) => {
                 warning.kind()
             }
             Self::Reading(warning) => warning.kind(),
@@ -583,9 +570,9 @@ impl Warning {
     /// The sensor or the channel that it is about.
     pub fn about(&self) -> Option<&'static str> {
         match self {
-            Self::Of { sensor, .. } => Some(sensor.name()),
-            Self::Channel { channel, .. } => Some(channel),
-            Self::In { warning, .. } => warning.about(),
+            Self::Of(sensor, _) => Some(sensor.name()),
+            Self::Channel(channel, _) => Some(channel),
+            Self::In(_, warning) => warning.about(),
             Self::Health(finding) => finding.about,
             _ => None,
         }
@@ -611,29 +598,15 @@ impl Warning {
 
     /// This warning, about channel `c`.
     pub(crate) fn of_channel(self, c: usize) -> Self {
-        Self::Channel {
-            channel: RAW_COLUMNS[c],
-            warning: Box::new(self),
-        }
+        Self::Channel(RAW_COLUMNS[c], Box::new(self))
     }
 
     /// Whether `other` is of the same kind, about the same sensor, with the same cause: then only one of the two need be printed.
     pub fn is_like(&self, other: &Self) -> bool {
         let same = discriminant(self) == discriminant(other);
         same && match (self, other) {
-            (
-                Self::Of {
-                    sensor: s,
-                    warning: one,
-                },
-                Self::Of {
-                    sensor: t,
-                    warning: other,
-                },
-            ) => s == t && one.is_like(other),
-            (Self::Channel { warning: one, .. }, Self::Channel { warning: other, .. }) => {
-                one.is_like(other)
-            }
+            (Self::Of(s, one), Self::Of(t, other)) => s == t && one.is_like(other),
+            (Self::Channel(_, one), Self::Channel(_, other)) => one.is_like(other),
             (Self::Reading(one), Self::Reading(other)) => discriminant(one) == discriminant(other),
             (Self::Health(one), Self::Health(other)) => {
                 let of_channel = |found: &Finding| {
@@ -663,7 +636,7 @@ impl Warning {
     /// Whether it says that a prior is given up.
     pub fn gives_prior_up(&self) -> bool {
         match self {
-            Self::Of { warning, .. } => warning.gives_prior_up(),
+            Self::Of(_, warning) => warning.gives_prior_up(),
             other => matches!(other, Self::NotOfPopulation { .. }),
         }
     }

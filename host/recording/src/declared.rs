@@ -1,29 +1,33 @@
 //! What a person declares of a recording: the unit of its readings, what is known of the input, where readings saturate, turns by hand.
 
-use std::fmt;
-
 use serde::{Deserialize, Serialize};
+use strum::{Display, EnumString};
 
 use crate::error::{Argument, Error, Result};
 
 /// Unit of the raw columns.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Display, EnumString)]
+#[strum(parse_err_ty = Error, parse_err_fn = unknown_unit)]
 pub enum RawUnit {
     /// Volts at the converter's input.
     #[serde(rename = "V")]
+    #[strum(serialize = "V")]
     Volt,
     /// The device's own counts.
     #[serde(rename = "count")]
+    #[strum(serialize = "count")]
     Count,
     /// Already rad/s and m/s², from a device that applies its own calibration. "Raw" is then what that device reports, and the fit finds the errors
     /// that its calibration leaves.
     #[serde(rename = "SI")]
+    #[strum(to_string = "SI", serialize = "si")]
     Si,
 }
 
 /// What is known of the true input.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Display, EnumString)]
 #[serde(rename_all = "kebab-case")]
+#[strum(serialize_all = "kebab-case", parse_err_ty = Error, parse_err_fn = unknown_reference)]
 pub enum Reference {
     /// The `ref_` columns contain it.
     Table,
@@ -33,58 +37,18 @@ pub enum Reference {
     TurntableRate,
 }
 
-impl fmt::Display for RawUnit {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            RawUnit::Volt => "V",
-            RawUnit::Count => "count",
-            RawUnit::Si => "SI",
-        })
-    }
+fn unknown_unit(text: &str) -> Error {
+    unknown("raw unit", text, "write V, count or SI (rad/s and m/s²)")
 }
 
-impl fmt::Display for Reference {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Reference::Table => "table",
-            Reference::Gravity => "gravity",
-            Reference::TurntableRate => "turntable-rate",
-        })
-    }
+fn unknown_reference(text: &str) -> Error {
+    let remedy = "write table (ref_ columns give the input), gravity (only its magnitude is known) or turntable-rate (only the magnitude of the rate)";
+    unknown("reference", text, remedy)
 }
 
-impl std::str::FromStr for RawUnit {
-    type Err = Error;
-
-    fn from_str(text: &str) -> Result<Self> {
-        match text {
-            "V" => Ok(RawUnit::Volt),
-            "count" => Ok(RawUnit::Count),
-            "SI" | "si" => Ok(RawUnit::Si),
-            _ => Err(Error::new(
-                "raw unit",
-                format!("{} is unknown", super::cell::shorten(text.as_bytes())),
-                "write V, count or SI (rad/s and m/s²)",
-            )),
-        }
-    }
-}
-
-impl std::str::FromStr for Reference {
-    type Err = Error;
-
-    fn from_str(text: &str) -> Result<Self> {
-        match text {
-            "table" => Ok(Reference::Table),
-            "gravity" => Ok(Reference::Gravity),
-            "turntable-rate" => Ok(Reference::TurntableRate),
-            _ => Err(Error::new(
-                "reference",
-                format!("{} is unknown", super::cell::shorten(text.as_bytes())),
-                "write table (ref_ columns give the input), gravity (only its magnitude is known) or turntable-rate (only the magnitude of the rate)",
-            )),
-        }
-    }
+fn unknown(place: &str, text: &str, remedy: &str) -> Error {
+    let word = super::cell::shorten(text.as_bytes());
+    Error::new(place, format!("{word} is unknown"), remedy)
 }
 
 /// Readings at which each sensor's output stops following its input, in raw units.
@@ -92,10 +56,8 @@ impl std::str::FromStr for Reference {
 #[serde(deny_unknown_fields)]
 pub struct Rails {
     /// Lowest and highest reading of the gyros.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gyro: Option<[f64; 2]>,
     /// Lowest and highest reading of the accelerometers.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub accel: Option<[f64; 2]>,
 }
 

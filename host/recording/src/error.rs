@@ -1,10 +1,12 @@
 //! Errors: kind, place, problem and remedy.
 
-use std::fmt;
+use std::fmt::{self, Display};
 use std::path::Path;
 
+use serde::Serialize;
+
 /// What was refused, shown as one line: `PLACE: PROBLEM; REMEDY`. A user needs all three parts, so none can be left out.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Refused {
     /// File with row and column, or step, axis, parameter: as narrow as is known.
     pub place: String,
@@ -13,6 +15,7 @@ pub struct Refused {
     /// What the reader can do about it.
     pub remedy: String,
     /// Settings that the caller can change; a command adds the names of its flags.
+    #[serde(skip)]
     pub arguments: Vec<Argument>,
 }
 
@@ -119,40 +122,34 @@ arguments! {
     Prefix, "--prefix", "Beginning of the names in a source file.";
 }
 
+impl Refused {
+    fn new(place: &dyn Display, problem: &dyn Display, remedy: &dyn Display) -> Self {
+        Self {
+            place: place.to_string(),
+            problem: problem.to_string(),
+            remedy: remedy.to_string(),
+            arguments: Vec::new(),
+        }
+    }
+}
+
 /// Result with [`Error`].
 pub type Result<T> = std::result::Result<T, Error>;
 
 impl Error {
     /// An invalid input at `place` (file, row, column, step or axis).
-    pub fn new(
-        place: impl fmt::Display,
-        problem: impl fmt::Display,
-        remedy: impl fmt::Display,
-    ) -> Self {
-        Self::Invalid(Refused {
-            place: place.to_string(),
-            problem: problem.to_string(),
-            remedy: remedy.to_string(),
-            arguments: Vec::new(),
-        })
+    pub fn new(place: impl Display, problem: impl Display, remedy: impl Display) -> Self {
+        Self::Invalid(Refused::new(&place, &problem, &remedy))
     }
 
     /// An experiment that does not determine what was asked for.
-    pub fn undetermined(
-        place: impl fmt::Display,
-        problem: impl fmt::Display,
-        remedy: impl fmt::Display,
-    ) -> Self {
-        Self::Undetermined(Self::new(place, problem, remedy).into_refused())
+    pub fn undetermined(place: impl Display, problem: impl Display, remedy: impl Display) -> Self {
+        Self::Undetermined(Refused::new(&place, &problem, &remedy))
     }
 
     /// A device that does not answer, or refuses.
-    pub fn device(
-        place: impl fmt::Display,
-        problem: impl fmt::Display,
-        remedy: impl fmt::Display,
-    ) -> Self {
-        Self::Device(Self::new(place, problem, remedy).into_refused())
+    pub fn device(place: impl Display, problem: impl Display, remedy: impl Display) -> Self {
+        Self::Device(Refused::new(&place, &problem, &remedy))
     }
 
     /// Adds `argument` to the settings that can be changed.
@@ -186,15 +183,6 @@ impl Error {
         }
     }
 
-    fn into_refused(self) -> Refused {
-        match self {
-            Self::Io(_, refused)
-            | Self::Invalid(refused)
-            | Self::Undetermined(refused)
-            | Self::Device(refused) => refused,
-        }
-    }
-
     /// An error of the operating system on a file or folder.
     pub fn io(path: &Path, error: &std::io::Error) -> Self {
         let remedy = match error.kind() {
@@ -211,14 +199,11 @@ impl Error {
             .next()
             .unwrap_or_default()
             .to_lowercase();
-        Self::Io(
-            error.kind(),
-            Self::new(path.display(), text, remedy).into_refused(),
-        )
+        Self::Io(error.kind(), Refused::new(&path.display(), &text, &remedy))
     }
 }
 
-impl fmt::Display for Error {
+impl Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Refused {
             place,

@@ -53,6 +53,7 @@ pub use batch::Batch;
 pub use clock::{ClockRate, REFUSED_SHARE, REPORTED_SHARE, Times};
 pub use columns::{Column, Columns, RAW_COLUMNS, REFERENCE_COLUMNS};
 pub use declared::{Rails, RawUnit, Reference, WholeTurns};
+pub use error::{Argument, Error, Result};
 pub use growing::Growing;
 #[cfg(feature = "parquet")]
 pub use import::text_columns;
@@ -74,6 +75,6 @@ pub use toml_file::{check_kind, parse_toml, read_text};
 pub use triad_name::{TriadKind, TriadName};
 pub use triads::Triads;
 pub use turntable::{Turntable, TurntableRate, rate_error};
-pub use unit_name::{UNNAMED, are_two_units, two_units};
+pub use unit_name::{UNNAMED, are_two_units};
 pub use warning::Warning;
 pub use writer::{SampleFormat, Writer};

@@ -59,13 +59,11 @@ pub struct Manifest {
     /// Unit of the raw columns.
     pub raw_unit: RawUnit,
     /// Latitude in degrees, north positive: estimates subtract the Earth's rate from a gyro's input. The known rates are those against the ground.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub latitude_deg: Option<f64>,
     /// What is known of the true input.
     pub reference: Reference,
     /// Time of the power-on, on the clock of `t_s`, s. Effects that depend on the time since power-on count from it; without it, from the first
     /// sample.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub power_on_s: Option<f64>,
     /// Whether the recording was not finished: its program was killed, or is still recording. A cut last row is then left out.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
@@ -86,22 +84,16 @@ pub struct Manifest {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub imported_with: Vec<String>,
     /// The device from which it was recorded.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub recorded: Option<Recorded>,
     /// How fast the clock of the times runs, if it was compared with a better one.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub clock: Option<ClockRate>,
     /// Where readings saturate.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rails: Option<Rails>,
     /// What is stated of turns by hand that end where they began.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub whole_turns: Option<WholeTurns>,
     /// The known rates, if the reference is the magnitude of the rate.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub turntable: Option<Turntable>,
     /// How well the reference is known, if that is stated.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reference_error: Option<ReferenceError>,
     /// Files from which it was imported.
     #[serde(default, rename = "source", skip_serializing_if = "Vec::is_empty")]

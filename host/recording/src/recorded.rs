@@ -15,10 +15,8 @@ pub struct Recorded {
     /// The microcontroller's own number, hexadecimal.
     pub unit_id: String,
     /// Why the device had started, if it was not by a power-on: its clock began then, and the time of the power-on is unknown.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub start: Option<String>,
     /// Its sensors as they were set.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sensors: Option<SensorSettings>,
     /// Samples missing between the first and the last, except at restarts. Each gap is a longer interval of `t_s`.
     #[serde(default)]

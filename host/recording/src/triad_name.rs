@@ -5,7 +5,8 @@ use std::fmt;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 /// What a triad measures.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, strum::IntoStaticStr)]
+#[strum(serialize_all = "lowercase")]
 pub enum TriadKind {
     /// Angular rate.
     Gyro,
@@ -21,11 +22,7 @@ impl TriadKind {
 
     /// Stem of its columns.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Gyro => "gyro",
-            Self::Accel => "accel",
-            Self::Mag => "mag",
-        }
+        self.into()
     }
 }
 

@@ -9,16 +9,6 @@ pub fn are_two_units(one: &str, other: &str) -> bool {
     one != other && one != UNNAMED && other != UNNAMED
 }
 
-/// Two names among `names` that belong to two units, and the place of the second, if there are two.
-pub fn two_units<'a>(
-    names: impl IntoIterator<Item = &'a str>,
-) -> Option<(&'a str, &'a str, usize)> {
-    let mut named = names.into_iter().enumerate().filter(|(_, n)| *n != UNNAMED);
-    let (_, first) = named.next()?;
-    let (at, other) = named.find(|(_, name)| are_two_units(first, name))?;
-    Some((first, other, at))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -27,7 +17,5 @@ mod tests {
     fn a_name_on_one_side_only_contradicts_nothing_and_two_names_do() {
         assert!(!are_two_units("a", "a") && !are_two_units("a", UNNAMED));
         assert!(!are_two_units(UNNAMED, UNNAMED) && are_two_units("a", "b"));
-        assert_eq!(two_units([UNNAMED, "a", UNNAMED, "a"]), None);
-        assert_eq!(two_units([UNNAMED, "a", UNNAMED, "b"]), Some(("a", "b", 3)));
     }
 }

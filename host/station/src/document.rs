@@ -2,7 +2,7 @@
 
 use mimu::data_sheet::Part;
 use mimu::quantity::Sensor;
-use mimu_recording::error::{Error, Result};
+use mimu_recording::error::{Error, Refused, Result};
 use serde::{Deserialize, Serialize};
 
 use crate::decision::Decision;
@@ -56,17 +56,6 @@ pub struct Measurement {
     pub limits_of: Option<String>,
 }
 
-/// Why a unit could not be measured.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Problem {
-    /// The thing: a recording, a port.
-    pub place: String,
-    /// What is wrong.
-    pub problem: String,
-    /// What to do.
-    pub remedy: String,
-}
-
 /// The same unit by the calibration that it came with.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AsFound {
@@ -98,7 +87,7 @@ pub struct Document {
     /// Verdict.
     pub verdict: Verdict,
     /// Why it could not be measured.
-    pub problem: Option<Problem>,
+    pub problem: Option<Refused>,
     /// Which values pass.
     pub decision: Decision,
     /// How readings became SI.
@@ -198,13 +187,8 @@ impl Document {
 
     /// With the reason why the unit could not be measured.
     pub fn refused(mut self, error: &Error) -> Self {
-        let refused = error.refused();
         self.verdict = Verdict::NotMeasured;
-        self.problem = Some(Problem {
-            place: refused.place.clone(),
-            problem: refused.problem.clone(),
-            remedy: refused.remedy.clone(),
-        });
+        self.problem = Some(error.refused().clone());
         self
     }
 

@@ -56,19 +56,16 @@ pub fn by_faces(
         (mean, noise)
     });
     for (axis, (offset, noise)) in offsets.into_iter().enumerate() {
-        let name = Quantity::AccelOffset.name(Some(axis));
-        let unit = Quantity::AccelOffset.unit();
-        let measured = Measured::new(name, offset * mg, unit, noise.sqrt() * mg);
+        let measured = Quantity::AccelOffset.measured(Some(axis), offset * mg, noise.sqrt() * mg);
         // The two sides are level independently of each other.
         all.push(measured.with_common(g * level / 2f64.sqrt() * mg));
     }
     for (axis, (offset, noise)) in offsets.into_iter().enumerate() {
         let (face, sign) = of_axis[axis];
         let reading = sign * (face.force[axis] - offset);
-        let name = Quantity::AccelSensitivity.name(Some(axis));
-        let unit = Quantity::AccelSensitivity.unit();
+        let percent = 100.0 * (reading / g - 1.0);
         let by_noise = 100.0 * (face.variance[axis] + noise).sqrt() / g;
-        let measured = Measured::new(name, 100.0 * (reading / g - 1.0), unit, by_noise);
+        let measured = Quantity::AccelSensitivity.measured(Some(axis), percent, by_noise);
         // The offset's error, the cosine of the angle about two axes, and gravity.
         let type_b = (level / 2f64.sqrt())
             .hypot(level * level)

@@ -3,10 +3,8 @@
 use std::path::Path;
 
 use mimu::data_sheet::{Part, Property};
-use mimu::quantity::Sensor;
-use mimu::readable::STANDARD_GRAVITY;
-use mimu_recording::error::{Error, Result};
-use mimu_recording::{RawUnit, check_kind, parse_toml, read_text};
+use mimu::{STANDARD_GRAVITY, Sensor};
+use mimu_recording::{Error, RawUnit, Result, check_kind, parse_toml, read_text};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
@@ -178,7 +176,7 @@ impl Limits {
                 if self_test {
                     continue;
                 }
-                let names: Vec<&str> = Quantity::ALL.iter().map(|q| q.without_axis()).collect();
+                let names: Vec<&str> = Quantity::all().map(Quantity::without_axis).collect();
                 let remedy = format!(
                     "use one of {}, with the axis after the sensor for one axis (gyro_x_offset), or self_test_ and a name",
                     names.join(", ")

@@ -4,8 +4,7 @@
 
 use mimu::prior::{FALSE_STRANGER, Prior, PriorTable};
 use mimu::quantity::{AXES, Sensor};
-use mimu_recording::RawUnit;
-use mimu_recording::error::{Error, Result};
+use mimu_recording::{Error, RawUnit, Result};
 use nalgebra::Vector3;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
@@ -58,10 +57,10 @@ impl Population {
                 source: format!("{}: {} units", self.place, table.units),
             });
         };
-        let [offset, sheet] = match sensor {
-            Sensor::Gyro => [Quantity::GyroOffset, Quantity::GyroOffset],
-            Sensor::Accel => [Quantity::AccelOffset, Quantity::AccelSensitivity],
-        };
+        let [offset, sheet] = sensor.pick(
+            [Quantity::GyroOffset, Quantity::GyroOffset],
+            [Quantity::AccelOffset, Quantity::AccelSensitivity],
+        );
         // mg, as data sheets.
         let unit = si_per_sheet(sensor) / if sensor == Sensor::Accel { 1e3 } else { 1.0 };
         let biases = bounds.three("bias").filter(|_| self.prior.biases);

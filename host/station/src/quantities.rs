@@ -1,7 +1,6 @@
 //! Everything that is measured in one rest.
 
-use mimu::quantity::Sensor;
-use mimu::readable::STANDARD_GRAVITY;
+use mimu::{STANDARD_GRAVITY, Sensor};
 use mimu_device::Verdict;
 use mimu_recording::error::Result;
 use mimu_recording::health::is_coarse;
@@ -93,9 +92,8 @@ pub fn measure(samples: &Samples, scale: &Scale, expected_up: Option<&str>) -> R
 }
 
 impl Quantities {
-    fn add(&mut self, of: Quantity, axis: Option<(Sensor, usize)>, value: f64, sigma: f64) {
-        let measured = Measured::new(of.name(axis.map(|(_, k)| k)), value, of.unit(), sigma);
-        self.measured.push(measured);
+    fn add(&mut self, of: Quantity, axis: Option<usize>, value: f64, sigma: f64) {
+        self.measured.push(of.measured(axis, value, sigma));
     }
 
     fn missing(&mut self, of: Quantity, axis: Option<usize>, why: &str) {
@@ -111,22 +109,14 @@ impl Quantities {
         let along = up.component_mul(&up).dot(&variance).sqrt();
         let mg = MILLI / STANDARD_GRAVITY;
         let [gravity, sigma] = samples.gravity;
-        let error = Measured::new(
-            Quantity::GravityError.name(None),
-            (force.norm() - gravity) * mg,
-            Quantity::GravityError.unit(),
-            along * mg,
-        );
+        let off = force.norm() - gravity;
+        let error = Quantity::GravityError.measured(None, off * mg, along * mg);
         self.measured.push(error.with_common(sigma * mg));
         let (side, nearest) = side_up(&force);
         let meant = expected.and_then(direction).unwrap_or(nearest);
         let across = variance.max().sqrt() / force.norm();
-        self.add(
-            Quantity::Tilt,
-            None,
-            force.angle(&meant).to_degrees(),
-            across.to_degrees(),
-        );
+        let tilt = force.angle(&meant).to_degrees();
+        self.add(Quantity::Tilt, None, tilt, across.to_degrees());
         self.up = Some(side);
         self.force = Some([force, variance]);
     }
@@ -135,13 +125,9 @@ impl Quantities {
         let rate = scale.apply(Sensor::Gyro, &rest.raw(Sensor::Gyro));
         let per_raw = scale.si_per_raw(Sensor::Gyro);
         for axis in 0..3 {
-            let sigma = rest.variance[axis].sqrt() * per_raw[axis];
-            let offset = Measured::new(
-                Quantity::GyroOffset.name(Some(axis)),
-                rate[axis].to_degrees(),
-                Quantity::GyroOffset.unit(),
-                sigma.to_degrees(),
-            );
+            let sigma = (rest.variance[axis].sqrt() * per_raw[axis]).to_degrees();
+            let offset = rate[axis].to_degrees();
+            let offset = Quantity::GyroOffset.measured(Some(axis), offset, sigma);
             let earth = (COMPONENT * EARTH).to_degrees();
             self.measured.push(offset.with_common(earth));
         }
@@ -149,25 +135,20 @@ impl Quantities {
 
     fn noise(&mut self, samples: &Samples, rest: &Rest, scale: &Scale, sensor: Sensor, hz: f64) {
         let per_raw = scale.si_per_raw(sensor);
-        let (of_rms, of_density, by) = match sensor {
-            Sensor::Gyro => (Quantity::GyroNoise, Quantity::GyroDensity, [1.0, 1.0]),
-            Sensor::Accel => (Quantity::AccelNoise, Quantity::AccelDensity, [MILLI, MICRO]),
-        };
+        let (of_rms, of_density, by) = sensor.pick(
+            (Quantity::GyroNoise, Quantity::GyroDensity, [1.0, 1.0]),
+            (Quantity::AccelNoise, Quantity::AccelDensity, [MILLI, MICRO]),
+        );
         for (axis, c) in sensor.channels().enumerate() {
             let readings = &samples.batch.raw[c][rest.rows.clone()];
             let sheet = per_raw[axis] / si_per_sheet(sensor);
             let (value, sigma) = rms(readings);
             let factor = by[0] * sheet;
-            self.add(of_rms, Some((sensor, axis)), factor * value, factor * sigma);
+            self.add(of_rms, Some(axis), factor * value, factor * sigma);
             match density(readings, 1.0 / hz) {
                 Some((value, sigma)) => {
                     let factor = by[1] * sheet;
-                    self.add(
-                        of_density,
-                        Some((sensor, axis)),
-                        factor * value,
-                        factor * sigma,
-                    );
+                    self.add(of_density, Some(axis), factor * value, factor * sigma);
                 }
                 None => self.missing(
                     of_density,
@@ -180,10 +161,10 @@ impl Quantities {
 
     /// Stuck bits, and runs of equal readings.
     fn codes(&mut self, samples: &Samples, rest: &Rest, scale: &Scale, sensor: Sensor) {
-        let (of_bits, of_run) = match sensor {
-            Sensor::Gyro => (Quantity::GyroBits, Quantity::GyroRun),
-            Sensor::Accel => (Quantity::AccelBits, Quantity::AccelRun),
-        };
+        let (of_bits, of_run) = sensor.pick(
+            (Quantity::GyroBits, Quantity::GyroRun),
+            (Quantity::AccelBits, Quantity::AccelRun),
+        );
         let lsb = scale.lsb[sensor as usize];
         let of = |c: usize| &samples.batch.raw[c][rest.rows.clone()];
         for (axis, c) in sensor.channels().enumerate() {
@@ -193,7 +174,7 @@ impl Quantities {
                 .and_then(|step| codes(readings, step))
                 .map(|codes| stuck_bits(&codes))
             {
-                Some(Some(count)) => self.add(of_bits, Some((sensor, axis)), count.into(), 0.0),
+                Some(Some(count)) => self.add(of_bits, Some(axis), count.into(), 0.0),
                 Some(None) => self.missing(of_bits, Some(axis), "the codes do not change"),
                 None => self.missing(of_bits, Some(axis), "the readings are no whole codes"),
             }
@@ -211,7 +192,7 @@ impl Quantities {
                 let longest = others.filter(|run| run.is_finite()).reduce(f64::max);
                 by_chance = longest.unwrap_or(readings.len() as f64 - 1.0);
             }
-            self.add(of_run, Some((sensor, axis)), run as f64, 0.0);
+            self.add(of_run, Some(axis), run as f64, 0.0);
             if by_chance.is_finite() {
                 self.own_limits.push(OwnLimit {
                     name: of_run.name(Some(axis)),
@@ -237,8 +218,7 @@ impl Quantities {
         } else {
             0.0
         };
-        let of = Quantity::Temperature;
-        let measured = Measured::new(of.name(None), mean, of.unit(), sigma);
+        let measured = Quantity::Temperature.measured(None, mean, sigma);
         self.measured.push(measured.with_common(THERMOMETER_C));
     }
 

@@ -2,6 +2,8 @@
 
 use mimu::quantity::AXES;
 
+use crate::measured::Measured;
+
 /// A quantity. Those of a sensor have a value for each axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Quantity {
@@ -39,63 +41,45 @@ pub enum Quantity {
     Temperature,
 }
 
+/// Each in the order of [`Quantity`], with its name without the axis, and its unit as in data sheets.
+const TABLE: [(Quantity, &str, &str); 16] = [
+    (Quantity::GravityError, "gravity_error", "mg"),
+    (Quantity::Tilt, "tilt", "deg"),
+    (Quantity::GyroOffset, "gyro_offset", "deg/s"),
+    (Quantity::AccelOffset, "accel_offset", "mg"),
+    (Quantity::AccelSensitivity, "accel_sensitivity", "%"),
+    (Quantity::GyroNoise, "gyro_noise_rms", "deg/s"),
+    (Quantity::GyroDensity, "gyro_noise_density", "deg/s/√Hz"),
+    (Quantity::AccelNoise, "accel_noise_rms", "mg"),
+    (Quantity::AccelDensity, "accel_noise_density", "µg/√Hz"),
+    (Quantity::GyroBits, "gyro_stuck_bits", "bit"),
+    (Quantity::AccelBits, "accel_stuck_bits", "bit"),
+    (Quantity::GyroRun, "gyro_equal_run", "sample"),
+    (Quantity::AccelRun, "accel_equal_run", "sample"),
+    (Quantity::SampleRate, "sample_rate", "Hz"),
+    (Quantity::LostSamples, "lost_samples", "%"),
+    (Quantity::Temperature, "temperature", "°C"),
+];
+
 impl Quantity {
     /// All.
-    pub const ALL: [Self; 16] = [
-        Self::GravityError,
-        Self::Tilt,
-        Self::GyroOffset,
-        Self::AccelOffset,
-        Self::AccelSensitivity,
-        Self::GyroNoise,
-        Self::GyroDensity,
-        Self::AccelNoise,
-        Self::AccelDensity,
-        Self::GyroBits,
-        Self::AccelBits,
-        Self::GyroRun,
-        Self::AccelRun,
-        Self::SampleRate,
-        Self::LostSamples,
-        Self::Temperature,
-    ];
+    pub fn all() -> impl Iterator<Item = Self> {
+        TABLE.into_iter().map(|(quantity, ..)| quantity)
+    }
 
     /// Name, without the axis.
     pub fn without_axis(self) -> &'static str {
-        match self {
-            Self::GravityError => "gravity_error",
-            Self::Tilt => "tilt",
-            Self::GyroOffset => "gyro_offset",
-            Self::AccelOffset => "accel_offset",
-            Self::AccelSensitivity => "accel_sensitivity",
-            Self::GyroNoise => "gyro_noise_rms",
-            Self::GyroDensity => "gyro_noise_density",
-            Self::AccelNoise => "accel_noise_rms",
-            Self::AccelDensity => "accel_noise_density",
-            Self::GyroBits => "gyro_stuck_bits",
-            Self::AccelBits => "accel_stuck_bits",
-            Self::GyroRun => "gyro_equal_run",
-            Self::AccelRun => "accel_equal_run",
-            Self::SampleRate => "sample_rate",
-            Self::LostSamples => "lost_samples",
-            Self::Temperature => "temperature",
-        }
+        TABLE[self as usize].1
     }
 
     /// Unit, as in data sheets.
     pub fn unit(self) -> &'static str {
-        match self {
-            Self::GravityError | Self::AccelOffset | Self::AccelNoise => "mg",
-            Self::Tilt => "deg",
-            Self::GyroOffset | Self::GyroNoise => "deg/s",
-            Self::AccelSensitivity | Self::LostSamples => "%",
-            Self::GyroDensity => "deg/s/√Hz",
-            Self::AccelDensity => "µg/√Hz",
-            Self::GyroBits | Self::AccelBits => "bit",
-            Self::GyroRun | Self::AccelRun => "sample",
-            Self::SampleRate => "Hz",
-            Self::Temperature => "°C",
-        }
+        TABLE[self as usize].2
+    }
+
+    /// This quantity of an axis, if it has one, in its unit.
+    pub(crate) fn measured(self, axis: Option<usize>, value: f64, sigma: f64) -> Measured {
+        Measured::new(self.name(axis), value, self.unit(), sigma)
     }
 
     /// Name with the axis, if it has one: `gyro_x_offset`.
@@ -109,10 +93,8 @@ impl Quantity {
 
     /// The quantity of a name with or without an axis.
     pub fn find(name: &str) -> Option<Self> {
-        let is = |all: &&Self| {
-            all.without_axis() == name || without_axis(name) == Some(all.without_axis().into())
-        };
-        Self::ALL.iter().find(is).copied()
+        let bare = without_axis(name);
+        Self::all().find(|of| [Some(name), bare.as_deref()].contains(&Some(of.without_axis())))
     }
 }
 
@@ -133,7 +115,7 @@ mod tests {
 
     #[test]
     fn every_name_is_found_with_and_without_its_axis() {
-        for quantity in Quantity::ALL {
+        for quantity in Quantity::all() {
             assert_eq!(Quantity::find(quantity.without_axis()), Some(quantity));
             if quantity.without_axis().starts_with("gyro") {
                 let name = quantity.name(Some(1));

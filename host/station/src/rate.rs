@@ -1,8 +1,7 @@
 //! Sample rate and lost samples, by the time stamps.
 
-use mimu_recording::error::Result;
 use mimu_recording::statistics::Line;
-use mimu_recording::usual_rate_hz;
+use mimu_recording::{Result, usual_rate_hz};
 
 /// What the time stamps say.
 #[derive(Debug, Clone, Copy, PartialEq)]

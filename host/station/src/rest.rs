@@ -7,8 +7,7 @@ use mimu::quantity::Sensor;
 use mimu::signal::blocks::Condensed;
 use mimu::signal::dwell::{Dwell, Dwells};
 use mimu::signal::stillness::{DwellSearch, STILL_FACTOR, Steps};
-use mimu_recording::Batch;
-use mimu_recording::error::{Error, Result};
+use mimu_recording::{Batch, Error, Result};
 use nalgebra::Vector3;
 
 use crate::gather::Samples;

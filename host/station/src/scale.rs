@@ -1,13 +1,9 @@
 //! Readings in SI: by a calibration, by the board, or by the range that is set.
 
-use mimu::calibration::Calibration;
 use mimu::data_sheet::Part;
-use mimu::quantity::Sensor;
-use mimu::readable::STANDARD_GRAVITY;
-use mimu::triad::Forward;
+use mimu::{Calibration, Forward, STANDARD_GRAVITY, Sensor};
 use mimu_core::compensation::Affine;
-use mimu_recording::RawUnit;
-use mimu_recording::error::{Error, Result};
+use mimu_recording::{Error, RawUnit, Result};
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
@@ -30,10 +26,7 @@ pub struct Ranges {
 
 impl Ranges {
     fn of(&self, sensor: Sensor) -> Option<f64> {
-        match sensor {
-            Sensor::Gyro => self.gyro_dps,
-            Sensor::Accel => self.accel_g,
-        }
+        sensor.pick(self.gyro_dps, self.accel_g)
     }
 }
 
@@ -52,10 +45,7 @@ pub struct Scale {
 
 /// SI for one deg/s or one g.
 pub(crate) fn si_per_sheet(sensor: Sensor) -> f64 {
-    match sensor {
-        Sensor::Gyro => 1f64.to_radians(),
-        Sensor::Accel => STANDARD_GRAVITY,
-    }
+    sensor.pick(1f64.to_radians(), STANDARD_GRAVITY)
 }
 
 fn diagonal(si_per_raw: f64) -> Affine<f64> {
@@ -151,10 +141,10 @@ impl Scale {
 
 fn full_scale(samples: &Samples, ranges: Option<&Ranges>, sensor: Sensor) -> Option<f64> {
     let given = ranges.and_then(|ranges| ranges.of(sensor));
-    let settings = samples.sensors.as_ref().map(|sensors| match sensor {
-        Sensor::Gyro => &sensors.gyro,
-        Sensor::Accel => &sensors.accel,
-    });
+    let settings = samples
+        .sensors
+        .as_ref()
+        .map(|sensors| sensor.pick(&sensors.gyro, &sensors.accel));
     let recorded = settings.map(|s| s.range / si_per_sheet(sensor));
     // A range in rad/s is a whole number of deg/s only to rounding.
     given.or(recorded.map(|range| (range * 1e6).round() / 1e6))
@@ -171,10 +161,10 @@ fn counts_per_sheet(
         let near = |[range, _]: &&[f64; 2]| (range / full_scale - 1.0).abs() < 0.01;
         own.ranges.iter().find(near).map(|[_, counts]| *counts)
     });
-    let bits = samples.sensors.as_ref().map(|sensors| match sensor {
-        Sensor::Gyro => sensors.gyro.bits,
-        Sensor::Accel => sensors.accel.bits,
-    });
+    let bits = samples
+        .sensors
+        .as_ref()
+        .map(|sensors| sensor.pick(sensors.gyro.bits, sensors.accel.bits));
     let half = bits.map_or(HALF_OF_16_BITS, |bits| 2f64.powi(i32::from(bits) - 1));
     of_part.unwrap_or(half / full_scale)
 }

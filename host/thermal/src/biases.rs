@@ -1,7 +1,7 @@
 //! Biases over temperature of a unit at rest, as a file: it serves the formats of autopilots, but is not a calibration.
 
-use mimu::calibration::Origin;
-use mimu::calibration::thermal_biases::{BiasNode, RestOfUnit, RestReading, ThermalBiases};
+use mimu::calibration::TOOL;
+use mimu::calibration::thermal_biases::{BiasNode, FORMAT, RestReading, ThermalBiases};
 use mimu::quantity::{PerSensor, Sensor};
 use mimu_core::compensation::Affine;
 use mimu_recording::error::{Error, Result};
@@ -68,18 +68,13 @@ impl ThermalFit {
                 accel: reading(Sensor::Accel),
             }
         });
-        let unit = RestOfUnit {
+        let made = ThermalBiases {
+            format: FORMAT.into(),
             device: first.device.clone(),
             unit_id: first.unit_id.clone(),
-            recording: Origin {
-                sha256: Some(first.sha256.clone()).filter(|s| !s.is_empty()),
-                reference: Some(first.reference),
-                raw_unit: first.raw_unit,
-                gravity_mps2: Some(first.gravity_mps2),
-                clock: None,
-                temp_c: None,
-                temp_range_c: Some(range_c),
-            },
+            created: created.into(),
+            tool: TOOL.into(),
+            recording: first.origin(range_c),
             range_c,
             judgement: self.judgement(),
             rms: PerSensor::from_fn(|sensor| {
@@ -89,6 +84,6 @@ impl ThermalFit {
             nodes: readings.collect(),
             dies: over.dies,
         };
-        ThermalBiases::of(unit, created)
+        made.checked(&format!("biases of {:?}", first.device))
     }
 }

@@ -7,8 +7,7 @@ use std::collections::BTreeSet;
 
 use mimu::quantity::Sensor;
 use mimu::signal::blocks::extent;
-use mimu_recording::Reference;
-use mimu_recording::error::{Argument, Error, Result};
+use mimu_recording::{Argument, Error, Reference, Result};
 
 use crate::session::Session;
 use crate::used::Used;

@@ -1,8 +1,7 @@
 //! One triad: its curves and the likelihood for each lag, with noise and smoothness that are found at one of them.
 
 use mimu::quantity::Sensor;
-use mimu_recording::Reference;
-use mimu_recording::error::{Error, Result};
+use mimu_recording::{Error, Reference, Result};
 
 use crate::basis::Shape;
 use crate::curves::{LagFit, TriadCurves};

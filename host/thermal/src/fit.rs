@@ -1,11 +1,10 @@
 //! `mimu thermal fit` from memory: curves, judged.
 
-use mimu::calibration::{Calibration, CurvesOfUnit, TriadOfCurves, reference_node};
+use mimu::calibration::{Calibration, CurvesOfUnit, Origin, TriadOfCurves, reference_node};
 use mimu::estimate::earth::RATE;
 use mimu::quantity::{PerSensor, Sensor};
 use mimu::signal::blocks::extent;
-use mimu_recording::error::{Error, Result};
-use mimu_recording::{Reference, are_two_units};
+use mimu_recording::{Error, Reference, Result, are_two_units};
 use serde::Serialize;
 
 use crate::basis::{CURVATURE_SPAN, Shape};
@@ -33,8 +32,9 @@ pub struct Options {
 const MISFIT: f64 = 10.0;
 
 /// Whether the recording distinguishes lag and slope, and the curves describe the readings.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, strum::IntoStaticStr)]
 #[serde(rename_all = "kebab-case")]
+#[strum(serialize_all = "kebab-case")]
 pub enum FitVerdict {
     /// Heating and cooling, or plateaus, distinguish lag and slope.
     Fitted,
@@ -47,11 +47,7 @@ pub enum FitVerdict {
 impl FitVerdict {
     /// As in files.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Fitted => "fitted",
-            Self::OneWay => "one-way",
-            Self::Misfit => "misfit",
-        }
+        self.into()
     }
 }
 
@@ -338,11 +334,10 @@ impl ThermalFit {
             device: first.device.clone(),
             unit_id: first.unit_id.clone(),
             sensors: first.sensors.clone(),
-            sha256: first.sha256.clone(),
-            raw_unit: first.raw_unit,
-            reference: first.reference,
-            gravity_mps2: first.gravity_mps2,
-            temp_c,
+            recording: Origin {
+                temp_c: Some(temp_c),
+                ..first.origin(temperature.range_c)
+            },
             triads,
             temperature,
             judgement: self.judgement(),

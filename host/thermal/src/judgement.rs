@@ -2,10 +2,8 @@
 
 use mimu::judge::errors::{self, ErrorFigures};
 use mimu::judge::input;
-use mimu::judgement::{Judgement, JudgementKind};
-use mimu::quantity::{AXES, Figure, Sensor, significant};
-use mimu::readable;
 use mimu::unseen::Test;
+use mimu::{AXES, Figure, Judgement, JudgementKind, Sensor, readable, significant};
 use mimu_recording::RawUnit;
 
 use crate::fit::{FitVerdict, Judged, ThermalFit};

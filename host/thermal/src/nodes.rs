@@ -2,9 +2,8 @@
 //! by cubic Hermite pieces.
 
 use mimu::calibration::{DieTable, NodeTable, OverTemperature, TemperatureNode};
-use mimu::quantity::{PerSensor, Sensor};
 use mimu::signal::blocks::extent;
-use mimu::triad::{Angles, Forward, Triad};
+use mimu::{Angles, Forward, PerSensor, Sensor, Triad};
 use mimu_core::compensation::Affine;
 use mimu_core::die::LEAST_LAG_S;
 use mimu_recording::error::{Argument, Error, Result};

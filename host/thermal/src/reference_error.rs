@@ -2,8 +2,7 @@
 
 use mimu::quantity::Sensor;
 use mimu::triad::{Covariance, Forward, vector};
-use mimu_recording::error::{Error, Result};
-use mimu_recording::{Reference, ReferenceError};
+use mimu_recording::{Error, Reference, ReferenceError, Result};
 use nalgebra::Vector3;
 
 use crate::session::Session;
@@ -25,10 +24,7 @@ impl CommonErrors {
         };
         let sigma = error.standard();
         Self {
-            share: match sensor {
-                Sensor::Gyro => sigma.rate,
-                Sensor::Accel => sigma.gravity_mps2 / session.gravity_mps2,
-            },
+            share: sensor.pick(sigma.rate, sigma.gravity_mps2 / session.gravity_mps2),
             mounting_rad: sigma.mounting_deg.to_radians(),
         }
     }

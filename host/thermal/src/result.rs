@@ -1,9 +1,8 @@
 //! `mimu-thermal/1`: what a fit over temperature found. SI and raw units throughout; what is not a number is null.
 
-use mimu::judgement::Judgement;
 use mimu::parameter::{ParameterKind, TriadParameter, parameters};
 use mimu::quantity::{PerSensor, Sensor, present, raw_unit};
-use mimu::triad::Estimate;
+use mimu::{Estimate, Judgement};
 use mimu_recording::RawUnit;
 use serde::Serialize;
 
@@ -271,10 +270,7 @@ fn biases(
 ) -> Vec<(TriadParameter, Estimate, String)> {
     let [model, _] = curves.forward(temp_c);
     let covariance = curves.covariance(temp_c);
-    let kind = match sensor {
-        Sensor::Gyro => ParameterKind::Bias,
-        Sensor::Accel => ParameterKind::BiasAndGravity,
-    };
+    let kind = sensor.pick(ParameterKind::Bias, ParameterKind::BiasAndGravity);
     (0..3)
         .map(|k| {
             let sigma = covariance[(9 + k, 9 + k)].max(0.0).sqrt();

@@ -1,13 +1,11 @@
 //! One recording, from power-on to power-off, as rows: means of some seconds with their known input, and the thermometer.
 
+use mimu::calibration::Origin;
 use mimu::estimate::EarthShare;
-use mimu::prepared::Prepared;
-use mimu::quantity::{PerSensor, Sensor};
 use mimu::signal::blocks::{Block, Condensed};
-use mimu::signal::dwell::Dwell;
+use mimu::{Dwell, PerSensor, Prepared, Sensor};
 use mimu_allan::variance::AllanModel;
-use mimu_recording::error::{Error, Result};
-use mimu_recording::{RawUnit, Reference, ReferenceError, SensorSettings};
+use mimu_recording::{Error, RawUnit, Reference, ReferenceError, Result, SensorSettings};
 use nalgebra::Vector3;
 
 use crate::bias_jumps::{self, BiasJump};
@@ -82,6 +80,19 @@ pub struct Session {
 }
 
 impl Session {
+    /// What a file says of this recording, in which the dies had these temperatures.
+    pub fn origin(&self, range_c: [f64; 2]) -> Origin {
+        Origin {
+            sha256: Some(self.sha256.clone()).filter(|s| !s.is_empty()),
+            reference: Some(self.reference),
+            raw_unit: self.raw_unit,
+            gravity_mps2: Some(self.gravity_mps2),
+            clock: None,
+            temp_c: None,
+            temp_range_c: Some(range_c),
+        }
+    }
+
     /// From `prepared`.
     ///
     /// # Errors

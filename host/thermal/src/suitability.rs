@@ -2,8 +2,7 @@
 
 use mimu::quantity::{duration, significant};
 use mimu::signal::blocks::extent;
-use mimu_recording::are_two_units;
-use mimu_recording::error::{Argument, Error, Result};
+use mimu_recording::{Argument, Error, Result, are_two_units};
 
 use crate::basis::SLOPE_SPAN;
 use crate::path::fastest;

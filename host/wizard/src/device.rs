@@ -6,8 +6,7 @@ use mimu::signal::increment::pause_periods;
 use mimu_core::wire::flags;
 use mimu_device::record::shortest;
 use mimu_device::{Event, Identity, Samples, Session, Started, Stream, look};
-use mimu_recording::RawUnit;
-use mimu_recording::error::Result;
+use mimu_recording::{RawUnit, Result};
 
 use crate::source::{Chunk, Source, SourceEvent, Unit};
 

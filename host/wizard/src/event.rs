@@ -1,10 +1,8 @@
 //! Output of a session: events, reported once each, and the state, reported many times a second. Both are plain data, so that lines
 //! of text and JSON lines are views of the same.
 
-use std::fmt;
-
 use mimu::diagnose::Verdict;
-use serde::{Serialize, Serializer};
+use serde::Serialize;
 
 use crate::folder::Part;
 use crate::refit::Progress;
@@ -196,7 +194,9 @@ impl Event {
 }
 
 /// The present phase of a session.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, strum::Display)]
+#[serde(rename_all = "kebab-case")]
+#[strum(serialize_all = "kebab-case")]
 pub enum Phase {
     /// Opening the units.
     #[default]
@@ -206,6 +206,8 @@ pub enum Phase {
     /// Dwells for the calibration.
     Calibration,
     /// Whole turns for the calibration.
+    #[serde(rename = "whole turns")]
+    #[strum(serialize = "whole turns")]
     WholeTurns,
     /// Dwells for the verification.
     Verification,
@@ -225,27 +227,6 @@ impl Phase {
             Self::Confirmation => Part::Confirmation,
             _ => Part::Calibration,
         }
-    }
-}
-
-impl fmt::Display for Phase {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Start => "start",
-            Self::WarmUp => "warm-up",
-            Self::Calibration => "calibration",
-            Self::WholeTurns => "whole turns",
-            Self::Verification => "verification",
-            Self::Store => "store",
-            Self::Diagnosis => "diagnosis",
-            Self::Confirmation => "confirmation",
-        })
-    }
-}
-
-impl Serialize for Phase {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_str(self)
     }
 }
 

@@ -16,10 +16,9 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use mimu::diagnose::Verdict;
-use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{
-    Batch, ClockRate, Columns, Growing, MANIFEST_FILE, Manifest, Recorded, Recording, Restart,
-    SampleFormat,
+    Argument, Batch, ClockRate, Columns, Error, Growing, MANIFEST_FILE, Manifest, Recorded,
+    Recording, Restart, Result, SampleFormat,
 };
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};

@@ -3,8 +3,9 @@
 use serde::{Deserialize, Serialize};
 
 /// A recording of the session.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, strum::IntoStaticStr)]
 #[serde(rename_all = "lowercase")]
+#[strum(serialize_all = "lowercase")]
 pub enum Part {
     /// For the calibration.
     Calibration,
@@ -17,10 +18,6 @@ pub enum Part {
 impl Part {
     /// Name of the recording's directory.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Calibration => "calibration",
-            Self::Verification => "verification",
-            Self::Confirmation => "confirmation",
-        }
+        self.into()
     }
 }

@@ -4,8 +4,7 @@ use mimu::plan::design::model::{Model, Setting};
 use mimu::plan::design::next_pose::Had;
 use mimu::plan::design::reach::{Fixture as Reached, Rates, Reach};
 use mimu::plan::design::tour::randomised;
-use mimu::prior::Prior;
-use mimu::quantity::normal_gravity;
+use mimu::{Prior, normal_gravity};
 use mimu_recording::{Reference, ReferenceError, WholeTurns};
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
@@ -13,8 +12,9 @@ use serde::{Deserialize, Serialize};
 use mimu_equipment::step::Step;
 
 /// The fixture that holds the unit.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, strum::IntoStaticStr)]
 #[serde(rename_all = "lowercase")]
+#[strum(serialize_all = "lowercase")]
 pub enum Fixture {
     /// A rate table: attitudes and rates are known.
     Table,
@@ -35,11 +35,7 @@ impl Fixture {
 
     /// Name on the command line.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Table => "table",
-            Self::Cube => "cube",
-            Self::Hands => "hands",
-        }
+        self.into()
     }
 
     /// Largest angle between a pose and the requested direction, degrees. Without a calibration the null of an MMA7260QT may be off by 0.2 g, which

@@ -2,22 +2,19 @@
 
 use std::sync::Arc;
 
-use mimu::fit::{Fit, Options, SensorFit, fit};
-use mimu::prepared::Prepared;
-use mimu::prior::Prior;
-use mimu::quantity::{AXES, Sensor};
-use mimu::readable::STANDARD_GRAVITY;
 use mimu::signal::stillness::STILL_FACTOR;
-use mimu::triad::{Angles, Estimate};
-use mimu_recording::error::Result;
-use mimu_recording::{Batch, Manifest};
+use mimu::{
+    AXES, Angles, Estimate, Fit, Options, Prepared, Prior, STANDARD_GRAVITY, Sensor, SensorFit, fit,
+};
+use mimu_recording::{Batch, Manifest, Result};
 use serde::Serialize;
 
 use crate::procedure::{Missed, Targets};
 
 /// A kind of parameter. The worst of the three axes counts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, strum::IntoStaticStr)]
 #[serde(rename_all = "lowercase")]
+#[strum(serialize_all = "lowercase")]
 pub enum Parameter {
     /// Biases.
     Bias,
@@ -30,11 +27,7 @@ pub enum Parameter {
 impl Parameter {
     /// Name in JSON.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Bias => "bias",
-            Self::Scale => "scale",
-            Self::Angles => "angles",
-        }
+        self.into()
     }
 }
 

@@ -2,16 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use mimu::calibration::Calibration;
-use mimu::diagnose::Verdict;
-use mimu::fit::{Fit, Options, fit};
-use mimu::prepared::Prepared;
-use mimu::prior::Prior;
-use mimu::quantity::Sensor;
-use mimu::result::diagnosis::DiagnosisResult;
-use mimu_recording::ClockRate;
-use mimu_recording::error::{Argument, Error, Result};
+use mimu::{Calibration, DiagnosisResult, Fit, Options, Prepared, Prior, Sensor, Verdict, fit};
 use mimu_recording::result_file::stage;
+use mimu_recording::{Argument, ClockRate, Error, Result};
 use serde::Serialize;
 
 use crate::axes;

@@ -2,8 +2,7 @@
 
 use mimu_core::compensation::Affine;
 use mimu_device::Session;
-use mimu_recording::error::{Error, Result};
-use mimu_recording::{ClockRate, RawUnit, SensorSettings};
+use mimu_recording::{ClockRate, Error, RawUnit, Result, SensorSettings};
 
 /// The unit at a port.
 #[derive(Debug, Clone)]

@@ -4,11 +4,9 @@ mod conditions;
 mod rows;
 mod spins;
 
-use mimu::fit::Fit;
-use mimu::quantity::Sensor;
 use mimu::signal::increment::is_bridged;
 use mimu::signal::stillness::GUARD_S;
-use mimu::triad::Triad;
+use mimu::{Fit, Sensor, Triad};
 use mimu_core::compensation::Affine;
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{ClockRate, Columns, Manifest, REPORTED_SHARE, Recorded};

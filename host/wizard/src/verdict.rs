@@ -1,15 +1,9 @@
 //! Judges whether a calibration is as accurate as predicted, by dwells that were not used for it.
 
-use mimu::calibration::Calibration;
 use mimu::calibration::verify::{PowerOn, SensorVerification, WholeTurnsOfAxis, verify_since};
-use mimu::fit::Fit;
-use mimu::judgement::{Judgement, JudgementKind};
-use mimu::prepared::Prepared;
-use mimu::quantity::{Figure, Sensor};
 use mimu::signal::stillness::STILL_FACTOR;
-use mimu::warning::Warning;
-use mimu_recording::Recording;
-use mimu_recording::error::Result;
+use mimu::{Calibration, Figure, Fit, Judgement, JudgementKind, Prepared, Sensor, Warning};
+use mimu_recording::{Recording, Result};
 use serde::Serialize;
 use std::path::Path;
 

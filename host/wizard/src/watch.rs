@@ -443,13 +443,6 @@ impl Watch {
         let rest = self.rest.map_or([0.0; 6], |r| r.0);
         gyro.matrix * Vector3::from_fn(|c, _| seen.mean[c] - rest[c])
     }
-
-    /// Standard deviation of one sample of the gyro at rest, rad/s; the noisiest axis. `gyro` is the model raw to SI.
-    pub fn gyro_noise(&self, gyro: &Affine<f64>) -> f64 {
-        let floor = self.floor.unwrap_or_default();
-        let of = |i: usize| gyro.matrix.row(i).norm() * floor[i].sqrt();
-        (0..3).map(of).fold(0.0, f64::max)
-    }
 }
 
 /// Specific force; `accel` is the model raw to SI.

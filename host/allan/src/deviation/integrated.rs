@@ -3,7 +3,6 @@
 use rayon::prelude::*;
 
 use crate::NotFinite;
-use crate::bounds::Sampling;
 use crate::spectrum::sum_over;
 
 /// Number of samples that are summed separately before they are added to the integral.
@@ -18,7 +17,6 @@ pub struct Integrated {
     /// Integral at the sample borders: one more than there are rates.
     x: Vec<f64>,
     dt_s: f64,
-    sampling: Sampling,
 }
 
 impl Integrated {
@@ -47,24 +45,7 @@ impl Integrated {
         // Exactly one more than the rates; a vector that grows automatically would double.
         rates.reserve_exact(1);
         rates.push(last);
-        Ok(Self {
-            x: rates,
-            dt_s,
-            sampling: Sampling::Instants,
-        })
-    }
-
-    /// Takes a series that is an integral already (rad, m/s, s), sampled every `dt_s`.
-    ///
-    /// # Errors
-    /// The first sample that is not a finite number.
-    pub fn of_phase(phase: &[f64], dt_s: f64) -> Result<Self, NotFinite> {
-        refuse_not_finite(phase)?;
-        Ok(Self {
-            x: phase.to_vec(),
-            dt_s,
-            sampling: Sampling::Means,
-        })
+        Ok(Self { x: rates, dt_s })
     }
 
     /// The integral.
@@ -80,20 +61,6 @@ impl Integrated {
     /// Sample period, s.
     pub fn dt_s(&self) -> f64 {
         self.dt_s
-    }
-
-    /// Meaning of the integral's samples.
-    pub(crate) fn sampling(&self) -> Sampling {
-        self.sampling
-    }
-
-    /// Divisor that turns a difference of the integral over one sample into a rate: rates are summed over samples, a phase is an integral
-    /// over seconds.
-    pub(crate) fn step(&self) -> f64 {
-        match self.sampling {
-            Sampling::Instants => 1.0,
-            Sampling::Means => self.dt_s,
-        }
     }
 }
 

@@ -5,14 +5,11 @@ mod units;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use clap::{Args, ValueEnum};
-use mimu::calibration::Calibration;
+use clap::Args;
 use mimu::data_sheet::Part;
-use mimu::judgement::JudgementKind;
-use mimu::prior::Prior;
-use mimu_recording::are_two_units;
-use mimu_recording::error::{Error, Result};
+use mimu::{Calibration, JudgementKind, Prior};
 use mimu_recording::result_file::stage;
+use mimu_recording::{Error, Result, are_two_units};
 use mimu_station::decision::Rule;
 use mimu_station::document::{AsFound, Document, Verdict, judged, verdict};
 use mimu_station::faces::{Face, by_faces};
@@ -22,7 +19,7 @@ use mimu_station::population::Population;
 use mimu_station::quantities::{Quantities, measure};
 use mimu_station::scale::{Ranges, Scale};
 
-use crate::arguments::{JsonArgs, VerboseArgs, number};
+use crate::arguments::{JsonArgs, VerboseArgs, choice, number};
 use crate::cmd::device::{duration, side};
 use crate::cmd::wizard::TextArgs;
 use crate::opening;
@@ -64,8 +61,11 @@ pub(crate) struct AcceptArgs {
     #[arg(long, value_name = "SIDE", allow_hyphen_values = true, value_parser = |t: &str| side(t).map(|_| t.to_owned()))]
     up: Option<String>,
     /// Which values pass [default: that of the limits, or guarded]
-    #[arg(long, value_enum)]
-    decision: Option<DecisionArg>,
+    #[arg(long, value_parser = choice(&[
+        ("guarded", "Values that are k standard uncertainties within their limits (k of the file, or 2)", Rule::Guarded),
+        ("simple", "Values within their limits", Rule::Simple),
+    ]))]
+    decision: Option<Rule>,
     /// Three sides up, one after the other: offsets and sensitivities of the accelerometer's axes
     #[arg(long)]
     faces: bool,
@@ -90,14 +90,6 @@ pub(crate) struct AcceptArgs {
         next_help_heading = "Gravity, and a log in place of a recording"
     )]
     log: LogArgs,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum DecisionArg {
-    /// Values that are k standard uncertainties within their limits (k of the file, or 2)
-    Guarded,
-    /// Values within their limits
-    Simple,
 }
 
 fn ranges(text: &str) -> std::result::Result<Ranges, String> {
@@ -161,11 +153,7 @@ impl<'a> Station<'a> {
         };
         limits.up = args.up.clone().or(limits.up);
         limits.ranges = args.range.or(limits.ranges);
-        limits.decision = match args.decision {
-            Some(DecisionArg::Guarded) => Rule::Guarded,
-            Some(DecisionArg::Simple) => Rule::Simple,
-            None => limits.decision,
-        };
+        limits.decision = args.decision.unwrap_or(limits.decision);
         let part = args.part.as_deref().or(limits.part.as_deref());
         let part = part.map(Part::find).transpose()?;
         if let Some(path) = &args.prior {
@@ -304,7 +292,7 @@ impl<'a> Station<'a> {
 }
 
 pub(crate) fn run(args: &AcceptArgs) -> Result<Status> {
-    check_outputs(&[args.json.file()], &[])?;
+    check_outputs(&[args.json.file()], None::<&Path>)?;
     let station = Station::of(args)?;
     let (mut failed, mut refused) = (false, Vec::new());
     let several = args.several();

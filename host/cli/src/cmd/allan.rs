@@ -5,14 +5,13 @@ use std::path::{Path, PathBuf};
 use crate::opening;
 use crate::report;
 use crate::report::allan_plot as plot;
-use clap::{Args, ValueEnum};
+use clap::Args;
 use mimu::result::allan::AllanResult;
 use mimu::survey::{Options, Part, survey_all};
 use mimu_allan::Deviation;
-use mimu_recording::error::{Error, Result};
-use mimu_recording::{MANIFEST_FILE, Recording};
+use mimu_recording::{Error, MANIFEST_FILE, Recording, Result};
 
-use crate::arguments::{JsonArgs, StrictArgs, VerboseArgs, number};
+use crate::arguments::{JsonArgs, StrictArgs, VerboseArgs, choice, number};
 use crate::hint::OF_A_LOG;
 use crate::output::{Results, check_outputs, now, progress};
 use crate::overwriting::check_overwritten;
@@ -35,8 +34,12 @@ pub struct AllanArgs {
     #[arg(long, value_name = "N", conflicts_with_all = ["from", "to"], allow_negative_numbers = true, value_parser = clap::value_parser!(i32).range(0..))]
     step: Option<i32>,
     /// Deviation to report; the model is always fitted to the overlapping Allan deviation
-    #[arg(long, value_enum, default_value = "allan")]
-    kind: KindArg,
+    #[arg(long, default_value = "allan", value_parser = choice(&[
+        ("allan", "Overlapping Allan", Deviation::Allan),
+        ("modified", "Modified Allan", Deviation::Modified),
+        ("hadamard", "Overlapping Hadamard, insensitive to drift", Deviation::Hadamard),
+    ]))]
+    kind: Deviation,
     /// Averaging times per decade
     #[arg(long, value_name = "K", default_value_t = 10, value_parser = clap::value_parser!(u16).range(1..=100))]
     per_decade: u16,
@@ -64,16 +67,6 @@ pub struct AllanArgs {
     log: LogArgs,
 }
 
-#[derive(Clone, Copy, ValueEnum)]
-enum KindArg {
-    /// Overlapping Allan
-    Allan,
-    /// Modified Allan
-    Modified,
-    /// Overlapping Hadamard, insensitive to drift
-    Hadamard,
-}
-
 impl AllanArgs {
     /// What is surveyed, and how.
     ///
@@ -90,11 +83,7 @@ impl AllanArgs {
                 }
                 (None, from_s, to_s) => Part::Span { from_s, to_s },
             },
-            kind: match self.kind {
-                KindArg::Allan => Deviation::Allan,
-                KindArg::Modified => Deviation::Modified,
-                KindArg::Hadamard => Deviation::Hadamard,
-            },
+            kind: self.kind,
             per_decade: usize::from(self.per_decade),
             confidence: self.confidence,
         })

@@ -6,9 +6,8 @@ use clap::Args;
 use clap::builder::PossibleValuesParser;
 use mimu::calibration::Calibration;
 use mimu_export::{FORMATS, Noise, Sources};
-use mimu_recording::RawUnit;
-use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::stage;
+use mimu_recording::{Error, RawUnit, Result};
 use serde_json::json;
 
 use super::export::written;

@@ -4,9 +4,9 @@ mod effects;
 mod noise;
 mod prior;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use clap::{ArgGroup, Args, ValueEnum};
+use clap::{ArgGroup, Args};
 use mimu::plan::design::Problem;
 use mimu::plan::design::budget::Session;
 use mimu::plan::design::reach::{Fixture, RateList, Rates};
@@ -14,12 +14,11 @@ use mimu::plan::design::tour::{Motion, randomised};
 use mimu::quantity::Sensor;
 use mimu::result::design::{Conditions, Design};
 use mimu::result::next_experiment::NextExperiment;
-use mimu_recording::Reference;
-use mimu_recording::error::{Error, Result};
+use mimu_recording::{Error, Reference, Result};
 use nalgebra::Vector3;
 use serde::Serialize;
 
-use crate::arguments::{JsonArgs, SensorArg, VerboseArgs, number};
+use crate::arguments::{JsonArgs, VerboseArgs, choice, number, sensor};
 use crate::output::{Results, check_outputs};
 use crate::overwriting::check_overwritten;
 use crate::report;
@@ -30,8 +29,8 @@ use noise::NoiseArg;
 #[command(group(ArgGroup::new("goal").required(true).multiple(true).args(["n", "budget", "effects", "prior"])))]
 pub struct DesignArgs {
     /// Sensor to calibrate
-    #[arg(long, value_enum, default_value = "accel")]
-    sensor: SensorArg,
+    #[arg(long, value_parser = sensor(), default_value = "accel")]
+    sensor: Sensor,
     /// What is known of the input: table (all of it) or gravity (its magnitude at rest) [default: table, or gravity with --table hand or --prior]
     #[arg(long)]
     reference: Option<Reference>,
@@ -68,8 +67,13 @@ pub struct DesignArgs {
     #[arg(long = "target", value_name = "NAME=VALUE", requires = "prior", conflicts_with_all = ["n", "budget"])]
     targets: Vec<String>,
     /// What holds the unit [default: three-axis, or hand with --reference gravity or --prior]
-    #[arg(long, value_enum)]
-    table: Option<TableArg>,
+    #[arg(long, value_parser = choice(&[
+        ("three-axis", "Every attitude, and a rate about the vertical", Fixture::ThreeAxis),
+        ("two-axis", "Any turn about the body's z, tilted by at most 95 degrees", Fixture::TwoAxis),
+        ("faces", "Six faces only", Fixture::Faces),
+        ("hand", "Every attitude, by hand", Fixture::Hand),
+    ]))]
+    table: Option<Fixture>,
     /// Length of a dwell, s
     ///
     /// By default 20 s, by hand 4 s; with a noise file, the length beyond which longer dwells reduce sigma by at most 5 %.
@@ -110,18 +114,6 @@ pub struct DesignArgs {
     json: JsonArgs,
 }
 
-#[derive(Clone, Copy, ValueEnum)]
-enum TableArg {
-    /// Every attitude, and a rate about the vertical
-    ThreeAxis,
-    /// Any turn about the body's z, tilted by at most 95 degrees
-    TwoAxis,
-    /// Six faces only
-    Faces,
-    /// Every attitude, by hand
-    Hand,
-}
-
 fn dwells(text: &str) -> std::result::Result<u16, String> {
     match text.parse() {
         Ok(n) if (1..=200).contains(&n) => Ok(n),
@@ -130,29 +122,18 @@ fn dwells(text: &str) -> std::result::Result<u16, String> {
 }
 
 impl DesignArgs {
-    fn sensor(&self) -> Sensor {
-        match self.sensor {
-            SensorArg::Gyro => Sensor::Gyro,
-            SensorArg::Accel => Sensor::Accel,
-        }
-    }
-
     fn reference(&self) -> Reference {
         self.reference.unwrap_or(match (self.table, &self.prior) {
-            (Some(TableArg::Hand), _) | (_, Some(_)) => Reference::Gravity,
+            (Some(Fixture::Hand), _) | (_, Some(_)) => Reference::Gravity,
             _ => Reference::Table,
         })
     }
 
     fn fixture(&self) -> Fixture {
-        match (self.table, self.reference()) {
-            (Some(TableArg::ThreeAxis), _) | (None, Reference::Table) => Fixture::ThreeAxis,
-            (Some(TableArg::TwoAxis), _) => Fixture::TwoAxis,
-            (Some(TableArg::Faces), _) => Fixture::Faces,
-            (Some(TableArg::Hand), _) | (None, Reference::Gravity | Reference::TurntableRate) => {
-                Fixture::Hand
-            }
-        }
+        self.table.unwrap_or(match self.reference() {
+            Reference::Table => Fixture::ThreeAxis,
+            Reference::Gravity | Reference::TurntableRate => Fixture::Hand,
+        })
     }
 
     fn motion(&self) -> Motion {
@@ -166,7 +147,7 @@ impl DesignArgs {
 
     /// The problem with the requested rates of the table.
     fn problem(&self) -> Result<Problem> {
-        match (self.sensor(), self.reference()) {
+        match (self.sensor, self.reference()) {
             (Sensor::Accel, _) if self.rates.is_some() => Err(Error::new(
                 "--rates",
                 "dwells of an accelerometer are at rest",
@@ -287,13 +268,8 @@ pub fn run(args: &DesignArgs) -> Result<()> {
         Some(NoiseArg::File(path)) => Some(path),
         _ => None,
     };
-    let stated: Vec<&Path> = noise
-        .iter()
-        .copied()
-        .chain(&args.prior)
-        .map(PathBuf::as_path)
-        .collect();
-    check_outputs(&[args.output.as_deref(), args.json.file()], &stated)?;
+    let stated = noise.into_iter().chain(&args.prior);
+    check_outputs(&[args.output.as_deref(), args.json.file()], stated)?;
     check_overwritten(&[args.output.as_deref()])?;
     let (made, plan) = args.made()?;
     let mut out = Results::new(made.text(args.verbose.verbose));

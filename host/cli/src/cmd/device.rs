@@ -5,23 +5,23 @@ mod transfer;
 mod trim;
 
 use std::io::Write as _;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use crate::report;
-use clap::{Args, Subcommand, ValueEnum};
+use clap::{Args, Subcommand};
 use mimu_core::wire::Request;
 use mimu_device::{
     Answer, Counted, DeviceResult, Session, Stream, Verdict, look, self_test, stream,
 };
-use mimu_recording::RAW_COLUMNS;
-use mimu_recording::error::{Error, Result};
+use mimu_recording::{Error, RAW_COLUMNS, Result};
 use mimu_station::side::direction;
 use nalgebra::Vector3;
 use signal_hook::consts::TERM_SIGNALS;
 
-use crate::arguments::JsonArgs;
+use crate::arguments::{JsonArgs, choice};
 use crate::output::{check_outputs, print};
 
 #[derive(Args)]
@@ -33,7 +33,7 @@ pub struct DeviceArgs {
 #[derive(Subcommand)]
 enum DeviceCommand {
     /// Show unit number, last reset cause, abilities and stored calibration
-    Info(PlainArgs),
+    Info(OnDevice),
     /// Print the samples as they come, as CSV
     Stream(StreamArgs),
     /// Store a calibration on the device
@@ -43,7 +43,7 @@ enum DeviceCommand {
     /// Correct the offsets of the stored calibration at today's temperature; the unit has to lie still
     Trim(trim::TrimArgs),
     /// Deflect the sensors electrically and measure the deflection; the unit has to stand still
-    SelfTest(PlainArgs),
+    SelfTest(OnDevice),
     /// Show the counters: lost samples, garbled frames, flash errors
     Counters(CountersArgs),
     /// Compare its compensated stream with the PC's compensation of its raw stream
@@ -59,34 +59,36 @@ pub struct PortArgs {
     pub path: Option<String>,
 }
 
+/// The device, and where the result goes.
 #[derive(Args)]
-struct PlainArgs {
+struct OnDevice {
     #[command(flatten)]
     port: PortArgs,
     #[command(flatten)]
     json: JsonArgs,
 }
 
-#[derive(Clone, Copy, ValueEnum)]
-enum StreamArg {
-    /// Readings, V at the sensors
-    Raw,
-    /// Readings compensated on the device, rad/s and m/s²
-    Compensated,
+impl OnDevice {
+    /// Opens the device, after checking that the result can be written and is not the file `input`.
+    fn open(&self, input: Option<&PathBuf>) -> Result<Session> {
+        check_outputs(&[self.json.file()], input)?;
+        open(&self.port)
+    }
 }
 
 #[derive(Args)]
 struct StreamArgs {
     /// Samples to print
-    #[arg(value_enum, default_value = "raw")]
-    which: StreamArg,
+    #[arg(default_value = "raw", value_parser = choice(&[
+        ("raw", "Readings, V at the sensors", Stream::Raw),
+        ("compensated", "Readings compensated on the device, rad/s and m/s²", Stream::Compensated),
+    ]))]
+    which: Stream,
     /// Duration by the device's clock (`10s`, `500ms`, `2min`) [default: until Ctrl-C]
     #[arg(long = "for", value_name = "TIME", value_parser = duration)]
     duration: Option<Duration>,
     #[command(flatten)]
-    port: PortArgs,
-    #[command(flatten)]
-    json: JsonArgs,
+    on: OnDevice,
 }
 
 #[derive(Args)]
@@ -95,9 +97,7 @@ struct CountersArgs {
     #[arg(long)]
     reset: bool,
     #[command(flatten)]
-    port: PortArgs,
-    #[command(flatten)]
-    json: JsonArgs,
+    on: OnDevice,
 }
 
 /// Direction of the axis that points up, in the body frame.
@@ -160,8 +160,8 @@ pub fn run(args: &DeviceArgs) -> Result<()> {
 /// Length of the samples that `info` reads.
 const FLAGS_SHOWN: Duration = Duration::from_millis(200);
 
-fn info(args: &PlainArgs) -> Result<()> {
-    check_outputs(&[args.json.file()], &[])?;
+fn info(args: &OnDevice) -> Result<()> {
+    check_outputs(&[args.json.file()], None::<&Path>)?;
     // The result contains the warning about versions.
     let mut session = Session::open(args.port.path.as_deref())?;
     let mut who = session.who().clone();
@@ -174,16 +174,11 @@ fn info(args: &PlainArgs) -> Result<()> {
 }
 
 fn run_stream(args: &StreamArgs) -> Result<()> {
-    check_outputs(&[args.json.file()], &[])?;
-    let which = match args.which {
-        StreamArg::Raw => Stream::Raw,
-        StreamArg::Compensated => Stream::Compensated,
-    };
-    let mut session = open(&args.port)?;
+    let mut session = args.on.open(None)?;
     let stop = interruption()?;
     let mut out = std::io::BufWriter::new(std::io::stdout().lock());
     // If JSON goes to standard output, it contains only the summary and no samples.
-    let rows = !args.json.is_standard_output();
+    let rows = !args.on.json.is_standard_output();
     let mut closed = false;
     if rows {
         closed |= writeln!(out, "n,t_s,temp_c,flags,{}", RAW_COLUMNS.join(",")).is_err();
@@ -192,7 +187,7 @@ fn run_stream(args: &StreamArgs) -> Result<()> {
     let mut last = 0;
     let found = stream(
         &mut session,
-        which,
+        args.which,
         args.duration,
         ended,
         |head, number, sample| {
@@ -224,12 +219,11 @@ fn run_stream(args: &StreamArgs) -> Result<()> {
     if rows && !closed {
         eprint!("{}", report::stream_text(&result));
     }
-    print(&args.json, "", &result, None)
+    print(&args.on.json, "", &result, None)
 }
 
-fn run_self_test(args: &PlainArgs) -> Result<()> {
-    check_outputs(&[args.json.file()], &[])?;
-    let mut session = open(&args.port)?;
+fn run_self_test(args: &OnDevice) -> Result<()> {
+    let mut session = args.open(None)?;
     let found = self_test(&mut session)?;
     let port = session.port();
     let result = DeviceResult::new("self-test", port, found);
@@ -251,8 +245,7 @@ fn run_self_test(args: &PlainArgs) -> Result<()> {
 }
 
 fn counters(args: &CountersArgs) -> Result<()> {
-    check_outputs(&[args.json.file()], &[])?;
-    let mut session = open(&args.port)?;
+    let mut session = args.on.open(None)?;
     let purpose = "for its counters";
     let patience = Duration::from_secs(2);
     let counters = match session.call(Request::Counters, purpose, patience)? {
@@ -267,7 +260,12 @@ fn counters(args: &CountersArgs) -> Result<()> {
         reset: args.reset,
     };
     let result = DeviceResult::new("counters", session.port(), counted);
-    print(&args.json, &report::counters_text(&result), &result, None)
+    print(
+        &args.on.json,
+        &report::counters_text(&result),
+        &result,
+        None,
+    )
 }
 
 #[cfg(test)]

@@ -6,21 +6,15 @@ use std::path::PathBuf;
 use crate::opening;
 use crate::report::{self, Made};
 use clap::Args;
-use mimu::diagnose::Recordings;
 use mimu::diagnosed::{Diagnosed, diagnosed};
-use mimu::fit::{Options as FitOptions, fit};
-use mimu::noise::noise_file::NoiseFile;
 use mimu::plan::next_experiment;
-use mimu::prepared::Prepared;
-use mimu::quantity::Sensor;
-use mimu::recording_problem::OfRecording;
-use mimu::result::diagnosis::DiagnosisResult;
-use mimu::signal::stillness::DwellSearch;
-use mimu::triad::Estimate;
+use mimu::{
+    DiagnosisResult, DwellSearch, Estimate, NoiseFile, OfRecording, Options as FitOptions,
+    Prepared, Recordings, Sensor, fit,
+};
 use mimu_body::result::EstimateResult;
 use mimu_body::{Body, Options, Pairs, Split, accel_delay_ms};
-use mimu_recording::Recording;
-use mimu_recording::error::Result;
+use mimu_recording::{Recording, Result};
 use serde::Serialize;
 use serde_json::{Value, json};
 

@@ -3,13 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Arg, ArgMatches, Args, Command, FromArgMatches, Subcommand};
-use mimu::calibration::Calibration;
 use mimu::calibration::thermal_biases::{self, ThermalBiases};
-use mimu::noise::noise_file::NoiseFile;
+use mimu::{Calibration, NoiseFile};
 use mimu_export::{Choice, Export, Noise, Sources};
-use mimu_recording::error::{Argument, Error, Result};
-use mimu_recording::read_text;
 use mimu_recording::result_file::stage;
+use mimu_recording::{Argument, Error, Result, read_text};
 use serde::Serialize;
 
 use crate::arguments::JsonArgs;
@@ -113,12 +111,8 @@ pub fn run(args: &ExportArgs) -> Result<()> {
         let problem = "this format cannot contain the noise of a unit";
         return Err(Error::new("export", problem, "leave it out").about(Argument::Noise));
     }
-    let inputs: Vec<&Path> = file
-        .into_iter()
-        .chain(&args.noise)
-        .map(PathBuf::as_path)
-        .collect();
-    check_outputs(&[Some(path), args.json.file()], &inputs)?;
+    let inputs = file.into_iter().chain(&args.noise);
+    check_outputs(&[Some(path), args.json.file()], inputs)?;
     check_overwritten(&[Some(path)])?;
     let named = file.map(|p| p.display().to_string());
     let (mut calibration, mut biases) = (None, None);

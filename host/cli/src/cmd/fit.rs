@@ -3,33 +3,26 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use clap::{Args, ValueEnum};
-use mimu::calibration::Calibration;
-use mimu::data_sheet::DataSheet;
+use clap::Args;
 use mimu::fit::{Fit, Options, fit_or_faces};
 use mimu::in_use::Trajectory;
-use mimu::judgement::Judgement;
-use mimu::noise::noise_file::NoiseFile;
-use mimu::prepared::Prepared;
-use mimu::prior::Prior;
-use mimu::quantity::PerSensor;
-use mimu::recording_problem::OfRecording;
 use mimu::result::fit::{DwellResult, FitResult};
 use mimu::result::sessions::SessionsResult;
 use mimu::sessions::class::PartClass;
 use mimu::sessions::{Sessions, fit_determined};
-use mimu::signal::dwell::Dwell;
-use mimu::signal::stillness::DwellSearch;
+use mimu::{
+    Calibration, DataSheet, Dwell, DwellSearch, Judgement, NoiseFile, OfRecording, PerSensor,
+    Prepared, Prior, Sensor,
+};
 use mimu_body::result::BodyResult;
 use mimu_body::{Body, Options as BodyOptions};
-use mimu_recording::error::{Error, Result};
-use mimu_recording::{MANIFEST_FILE, Recording, ReferenceError};
+use mimu_recording::{Error, MANIFEST_FILE, Recording, ReferenceError, Result};
 use serde::Serialize;
 
 use super::trajectory::{self, TrajectoryArgs};
 use crate::arguments::{
-    JsonArgs, KeepArgs, NoiseArgs, PartArgs, SensorArg, StillArgs, StrictArgs, VerboseArgs,
-    WholeTurnArgs, WritingArgs, with_noise,
+    JsonArgs, KeepArgs, NoiseArgs, PartArgs, StillArgs, StrictArgs, VerboseArgs, WholeTurnArgs,
+    WritingArgs, choice, sensor, with_noise,
 };
 use crate::hint::OF_A_LOG;
 use crate::output::{Results, check_outputs, now};
@@ -49,14 +42,17 @@ pub struct FitArgs {
     #[arg(required = true, value_name = "RECORDING")]
     recordings: Vec<PathBuf>,
     /// For one or two sessions: how much the parameters of this class of parts change from one power-on to the next [default for two: consumer]
-    #[arg(long, value_enum)]
-    class: Option<ClassArg>,
+    #[arg(long, value_parser = choice(&[
+        ("consumer", "Digital units of phones and drones", PartClass::Consumer),
+        ("tactical", "Units of a few degrees per hour", PartClass::Tactical),
+    ]))]
+    class: Option<PartClass>,
     /// Hold out N contiguous blocks in turn, refit without each, and report the error on it
     #[arg(long, value_name = "blocks=N", default_value = "blocks=4", value_parser = holdout)]
     holdout: usize,
     /// Calibrate one sensor only, if the experiment does not determine the other
-    #[arg(long, value_enum, value_name = "SENSOR")]
-    only: Option<SensorArg>,
+    #[arg(long, value_parser = sensor(), value_name = "SENSOR")]
+    only: Option<Sensor>,
     /// How well the true inputs are known, in place of what the recording states: tilt of a table, right angles, rate, gravity (docs/table.md)
     ///
     /// The errors enter the intervals, and a table shows their share of the variance of each parameter.
@@ -98,14 +94,6 @@ pub struct FitArgs {
     json: JsonArgs,
     #[command(flatten, next_help_heading = OF_A_LOG)]
     log: LogArgs,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum ClassArg {
-    /// Digital units of phones and drones
-    Consumer,
-    /// Units of a few degrees per hour
-    Tactical,
 }
 
 fn holdout(text: &str) -> std::result::Result<usize, String> {
@@ -153,7 +141,7 @@ impl FitArgs {
     fn options(&self) -> Options {
         Options {
             holdout_blocks: self.holdout,
-            only: self.only.map(SensorArg::sensor),
+            only: self.only,
         }
     }
 
@@ -177,10 +165,7 @@ impl FitArgs {
     }
 
     fn class(&self) -> PartClass {
-        match self.class {
-            None | Some(ClassArg::Consumer) => PartClass::Consumer,
-            Some(ClassArg::Tactical) => PartClass::Tactical,
-        }
+        self.class.unwrap_or(PartClass::Consumer)
     }
 
     /// `prepared`, with all that the arguments state.

@@ -48,12 +48,9 @@ pub struct FleetArgs {
 
 pub fn run(args: &FleetArgs, command_line: &str) -> Result<()> {
     let part = args.limits.as_deref().map(Part::find).transpose()?;
-    let inputs: Vec<_> = args.labels.as_deref().into_iter().collect();
-    check_outputs(
-        &[args.out.as_deref(), args.prior.as_deref(), args.json.file()],
-        &inputs,
-    )?;
-    check_overwritten(&[args.out.as_deref(), args.prior.as_deref()])?;
+    let outputs = [args.out.as_deref(), args.prior.as_deref(), args.json.file()];
+    check_outputs(&outputs, &args.labels)?;
+    check_overwritten(&outputs[..2])?;
     let table = args.labels.as_deref().map(LabelTable::read).transpose()?;
     let search = Search {
         folders: &args.names,

@@ -3,15 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use mimu::calibration::Calibration;
 use mimu::in_use::{Against, NoiseInUse, noise_in_use};
-use mimu::noise::noise_file::NoiseFile;
-use mimu::prepared::Prepared;
+use mimu::{Calibration, NoiseFile, Prepared};
 use mimu_export::kalibr::{self, Kalibr};
 use mimu_export::worst_axis::{NoiseOptions, WalkOptions};
 use mimu_export::{Sources, Target, driver};
-use mimu_recording::error::Result;
-use mimu_recording::{MANIFEST_FILE, Recording};
+use mimu_recording::{MANIFEST_FILE, Recording, Result};
 
 use super::trajectory::TrajectoryArgs;
 use crate::arguments::{JsonArgs, StillArgs, StrictArgs};

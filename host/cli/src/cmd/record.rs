@@ -1,7 +1,7 @@
 //! `mimu record`: arguments and execution.
 
 use std::io::IsTerminal as _;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
@@ -10,8 +10,7 @@ use clap::Args;
 use indicatif::ProgressBar;
 use mimu::plan::Plan;
 use mimu_device::record::{Known, RecordOptions, RecordingState, Steps, UserRequest, record};
-use mimu_recording::error::{Error, Result};
-use mimu_recording::{Inputs, SampleFormat};
+use mimu_recording::{Error, Inputs, Result, SampleFormat};
 
 use crate::arguments::{JsonArgs, assumed_gravity, known_gravity, warned};
 use crate::cmd::device::{PortArgs, duration, interruption, open};
@@ -108,9 +107,8 @@ fn every(text: &str) -> std::result::Result<(Duration, Duration), String> {
 }
 
 pub fn run(args: &RecordArgs) -> Result<()> {
-    let inputs = [args.plan.as_deref(), args.inputs.as_deref()];
-    let inputs: Vec<&Path> = inputs.into_iter().flatten().collect();
-    check_outputs(&[args.json.file()], &inputs)?;
+    let inputs = args.plan.iter().chain(&args.inputs);
+    check_outputs(&[args.json.file()], inputs)?;
     let plan = args.plan.as_deref().map(Plan::read).transpose()?;
     let gravity_mps2 = args.of.gravity_mps2(plan.as_ref());
     let (known, table) = match (&plan, &args.plan, &args.inputs) {

@@ -4,17 +4,12 @@ use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use mimu::calibration::Calibration;
 use mimu::calibration::verify::{Verification, WholeTurnsOfAxis, verify};
-use mimu::data_sheet::DataSheet;
-use mimu::diagnose::Recordings;
 use mimu::diagnosed::{Diagnosed, diagnosed};
-use mimu::prepared::Prepared;
-use mimu::recording_problem::OfRecording;
+use mimu::{Calibration, DataSheet, OfRecording, Prepared, Recordings};
 use mimu_body::{Body, Options};
-use mimu_recording::Recording;
-use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::stage;
+use mimu_recording::{Error, Recording, Result};
 
 use crate::arguments::{KeepArgs, NoiseArgs, PartArgs, StillArgs, WholeTurnArgs, with_noise};
 use crate::hint::OF_A_LOG;

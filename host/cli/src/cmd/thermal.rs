@@ -19,7 +19,7 @@ use crate::arguments::{
 };
 use crate::hint::OF_A_LOG;
 use crate::output::{Results, now};
-use crate::reading::{LogArgs, read};
+use crate::reading::{LogArgs, read_samples};
 use crate::report::{self, Made, thermal_plot};
 use crate::status::Status;
 
@@ -130,7 +130,7 @@ fn run_fit(args: &FitArgs, command_line: &str) -> Result<Status> {
     let base = args.base.as_deref().map(Calibration::read).transpose()?;
     let noise = args.noise.read()?;
     let session = |directory: &PathBuf, search: DwellSearch| {
-        let prepared = read(directory, &args.log, search, &outputs, &beside)?;
+        let (prepared, _) = read_samples(directory, &args.log, search, &outputs, &beside)?;
         Session::of(&with_noise(prepared, noise.as_ref())?)
     };
     let all = |list: &[PathBuf]| -> Result<Vec<Session>> {

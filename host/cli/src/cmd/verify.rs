@@ -5,17 +5,12 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use mimu::calibration::Calibration;
-use mimu::calibration::verify::{Verification, verify};
-use mimu::data_sheet::DataSheet;
-use mimu::judgement::Judgement;
-use mimu::noise::noise_file::NoiseFile;
-use mimu::prepared::Prepared;
-use mimu::signal::stillness::DwellSearch;
+use mimu::{
+    Calibration, DataSheet, DwellSearch, Judgement, NoiseFile, Prepared, Verification, verify,
+};
 use mimu_body::TriadVerification;
 use mimu_export::fitting_convention::{self, Reading};
-use mimu_recording::Recording;
-use mimu_recording::error::Result;
+use mimu_recording::{Recording, Result};
 use serde::Serialize;
 use serde_json::json;
 

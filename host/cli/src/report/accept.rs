@@ -2,7 +2,8 @@
 
 use maud::{Markup, html};
 use mimu::quantity::{plural, plus_minus, significant};
-use mimu_station::document::{Document, Measurement, Problem, Verdict};
+use mimu_recording::error::Refused;
+use mimu_station::document::{Document, Measurement, Verdict};
 
 use super::table::{number, table};
 use super::terminal::text;
@@ -59,7 +60,7 @@ pub fn accept_text(document: &Document, all: bool) -> String {
     })
 }
 
-fn problem_words(problem: &Problem) -> String {
+fn problem_words(problem: &Refused) -> String {
     format!("{}: {}; {}", problem.place, problem.problem, problem.remedy)
 }
 

@@ -5,9 +5,8 @@ use std::ops::Range;
 use maud::{Markup, html};
 
 use super::svg::{AXIS_CLASSES, Chart, Frame, Panel, px};
-use mimu::quantity::{Sensor, significant};
-use mimu::readable;
 use mimu::result::allan::{AllanResult, ChannelResult, ModelResult};
+use mimu::{Sensor, readable, significant};
 use mimu_allan::model::{FLOOR, Term};
 
 /// The panel of a sensor.
@@ -60,10 +59,7 @@ fn panel(result: &AllanResult, sensor: Sensor, channels: &[&ChannelResult]) -> M
             )
         }));
     }
-    let sensors = match sensor {
-        Sensor::Gyro => "Gyros",
-        Sensor::Accel => "Accelerometers",
-    };
+    let sensors = sensor.pick("Gyros", "Accelerometers");
     let title = format!(
         "{sensors} of {}",
         result.device.as_deref().unwrap_or_default()

@@ -1,8 +1,7 @@
 //! A compensated recording.
 
 use maud::html;
-use mimu::calibration::apply::Applied;
-use mimu::quantity::{Sensor, plural, significant};
+use mimu::{Applied, Sensor, plural, significant};
 use mimu_body::aligned::MeanUnit;
 
 use super::page::all_warnings;

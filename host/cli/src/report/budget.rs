@@ -1,9 +1,8 @@
 //! What the uncertainty of each parameter consists of, if errors of the reference are stated.
 
 use maud::{Markup, html};
-use mimu::quantity::Sensor;
 use mimu::result::budget::BudgetRow;
-use mimu::result::fit::FitResult;
+use mimu::{FitResult, Sensor};
 
 use super::table::table;
 use super::terminal::text;

@@ -1,8 +1,7 @@
 //! Results of the device's commands and recordings from it.
 
 use maud::{Markup, html};
-use mimu::quantity::{AXES, Sensor, plural, significant};
-use mimu::readable::STANDARD_GRAVITY;
+use mimu::{AXES, STANDARD_GRAVITY, Sensor, plural, significant};
 use mimu_device::record::RecordSummary;
 use mimu_device::{
     Checked, Contents, Counted, DeviceResult, Identity, KalmanRun, LineCount, SelfTested, Streamed,
@@ -65,10 +64,10 @@ fn brown_out(level: u8) -> Markup {
 
 /// A range in the unit of data sheets.
 fn sensor_range(sensor: Sensor, range: f64) -> String {
-    let (value, unit) = match sensor {
-        Sensor::Gyro => (range.to_degrees(), "deg/s"),
-        Sensor::Accel => (range / STANDARD_GRAVITY, "g"),
-    };
+    let (value, unit) = sensor.pick(
+        (range.to_degrees(), "deg/s"),
+        (range / STANDARD_GRAVITY, "g"),
+    );
     // Single precision of SI is no digit of a data sheet.
     format!("{} {unit}", (value * 1e3).round() / 1e3)
 }

@@ -4,16 +4,13 @@ mod effect;
 mod figures;
 
 use maud::{Markup, html};
-use mimu::diagnose::Verdict;
 use mimu::diagnose::decision::{Accepted, FALSE_LEFTOVER, LEVERAGE, Leftover};
 use mimu::diagnose::picture::Picture;
 use mimu::diagnose::search::{FALSE_FOUND, FALSE_LISTED};
-use mimu::fit::Split;
 use mimu::plan::next_experiment::{NotExcited, NotShown};
 use mimu::quantity::{Figure, Sensor, p_value, plural, significant};
-use mimu::readable;
 use mimu::result::diagnosis::{DiagnosisResult, SecondResult, SensorDiagnosisResult};
-use mimu::warning::Warning;
+use mimu::{Split, Verdict, Warning, readable};
 use mimu_recording::Reference;
 
 use super::page::{Level, Made, judged, kinds, page, problems, quantity, shown, spoken, written};

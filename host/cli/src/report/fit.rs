@@ -3,14 +3,10 @@
 use std::cmp::Reverse;
 
 use maud::{Markup, html};
-use mimu::fit::Split;
 use mimu::judge::input;
-use mimu::judgement::JudgementKind;
-use mimu::parameter::ParameterKind;
-use mimu::quantity::{Sensor, plural, plus_minus, significant};
 use mimu::readable::{self, Readable};
 use mimu::result::fit::{DwellResult, FitResult, Parameter, SensorFitResult};
-use mimu::warning::Warning;
+use mimu::{JudgementKind, ParameterKind, Sensor, Split, Warning, plural, plus_minus, significant};
 use mimu_recording::Reference;
 
 use super::page::{Level, judged, kinds, problems, warnings};
@@ -52,7 +48,7 @@ pub(super) fn document(fit: &FitResult, level: Level) -> Markup {
 /// Next step after the fit.
 fn next(fit: &FitResult) -> Markup {
     let judge = "judge it on another recording (mimu verify OTHER --calibration FILE)";
-    let contradict = |w: &Warning| matches!(w, Warning::Of { warning: w, .. } if matches!(**w, Warning::RatesContradict { .. }));
+    let contradict = |w: &Warning| matches!(w, Warning::Of(_, w) if matches!(**w, Warning::RatesContradict { .. }));
     html! { @match fit.judgement.kind {
         _ if fit.warnings.iter().any(contradict) => "correct the rates or their error (mimu import --rate-dps, --rate-error), and fit again; --verbose prints more",
         JudgementKind::Misfit => "correct range, columns or unit of the readings (mimu import), or record again; --verbose prints the dwells",

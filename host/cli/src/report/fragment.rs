@@ -3,15 +3,10 @@
 use std::fmt::Write as _;
 
 use maud::{Markup, PreEscaped, html};
-use mimu::calibration::Calibration;
-use mimu::calibration::verify::Verification;
-use mimu::fit::Fit;
 use mimu::in_use::NoiseInUse;
-use mimu::quantity::Sensor;
 use mimu::result::allan::AllanResult;
-use mimu::result::diagnosis::DiagnosisResult;
-use mimu::result::fit::FitResult;
 use mimu::result::sessions::SessionsResult;
+use mimu::{Calibration, DiagnosisResult, Fit, FitResult, Sensor, Verification};
 use mimu_thermal::result::ThermalResult;
 
 use super::page::{Level, Made, STYLE};

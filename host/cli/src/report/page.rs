@@ -6,10 +6,7 @@ use std::fmt::Display;
 use std::path::PathBuf;
 
 use maud::{Markup, PreEscaped, html};
-use mimu::judgement::Judgement;
-use mimu::quantity::{Sensor, significant};
-use mimu::readable::Readable;
-use mimu::recording_problem::OfRecording;
+use mimu::{Judgement, OfRecording, Readable, Sensor, significant};
 
 use super::terminal::text;
 use crate::output::now;
@@ -185,10 +182,7 @@ pub(super) fn written(text: &str) -> String {
 
 /// Name of a sensor in a sentence.
 pub(super) fn spoken(sensor: Sensor) -> &'static str {
-    match sensor {
-        Sensor::Gyro => "gyro",
-        Sensor::Accel => "accelerometer",
-    }
+    sensor.pick("gyro", "accelerometer")
 }
 
 /// Digits as superscripts.

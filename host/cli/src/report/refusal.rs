@@ -4,9 +4,8 @@ use std::io::Write as _;
 use std::sync::{Mutex, PoisonError};
 
 use anstream::AutoStream;
-use mimu::judgement::{Judgement, JudgementKind};
-use mimu::recording_problem::OfRecording;
-use mimu_recording::error::Error;
+use mimu::{Judgement, JudgementKind, OfRecording};
+use mimu_recording::error::{Error, Refused};
 use serde::Serialize;
 
 use super::page::problems_text;
@@ -18,16 +17,8 @@ struct Refusal<'a> {
     format: &'static str,
     /// Null if it is not about data: a file that is not there, an option.
     judgement: Option<Judgement>,
-    error: Refused<'a>,
+    error: &'a Refused,
     recording_problems: &'a [OfRecording],
-}
-
-/// The parts of the error line.
-#[derive(Serialize)]
-struct Refused<'a> {
-    place: &'a str,
-    problem: &'a str,
-    remedy: &'a str,
 }
 
 /// Faults of the recordings that the command has refused.
@@ -55,11 +46,7 @@ pub(crate) fn print_refusal(error: &Error) {
     let refusal = Refusal {
         format: "mimu-refusal/1",
         judgement,
-        error: Refused {
-            place: &told.place,
-            problem: &told.problem,
-            remedy: &told.remedy,
-        },
+        error: told,
         recording_problems: &problems,
     };
     if let Ok(pretty) = serde_json::to_string_pretty(&refusal) {

@@ -1,11 +1,8 @@
 //! A fit of several sessions.
 
 use maud::{Markup, html};
-use mimu::judgement::JudgementKind;
-use mimu::parameter::ParameterKind;
-use mimu::quantity::{Sensor, plural, plus_minus};
-use mimu::readable;
 use mimu::result::sessions::{SensorSessions, SessionParameter, SessionsResult};
+use mimu::{JudgementKind, ParameterKind, Sensor, plural, plus_minus, readable};
 
 use super::fit::by_axis;
 use super::page::{Level, judged};

@@ -1,8 +1,7 @@
 //! Tables of results: cells whose numbers have the value of the JSON beside their digits. `factor` converts from SI to the unit of the column or row.
 
 use maud::{Markup, html};
-use mimu::quantity::{AXES, plus_minus, significant};
-use mimu::readable::Readable;
+use mimu::{AXES, Readable, plus_minus, significant};
 
 use super::page::written;
 

@@ -1,9 +1,7 @@
 //! A fit over temperature, and the comparison of two.
 
 use maud::{Markup, html};
-use mimu::parameter::ParameterKind;
-use mimu::quantity::{Sensor, plural};
-use mimu::readable;
+use mimu::{ParameterKind, Sensor, plural, readable};
 use mimu_thermal::fit::FitVerdict;
 use mimu_thermal::result::{CurveResult, SensorResult, ThermalResult};
 

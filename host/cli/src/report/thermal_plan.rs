@@ -1,8 +1,7 @@
 //! A procedure over temperature and its predicted uncertainty.
 
 use maud::html;
-use mimu::quantity::{Sensor, duration};
-use mimu::readable;
+use mimu::{Sensor, duration, readable};
 use mimu_thermal::plan::Planned;
 
 use super::table::{number, table};

@@ -6,9 +6,7 @@ use std::ops::Range;
 use maud::{Markup, html};
 
 use super::svg::{AXIS_CLASSES, Chart, Panel, px, range};
-use mimu::parameter::ParameterKind;
-use mimu::quantity::{AXES, Sensor};
-use mimu::readable;
+use mimu::{AXES, ParameterKind, Sensor, readable};
 use mimu_thermal::judge::{Bin, DwellError};
 use mimu_thermal::result::{CurveResult, SensorResult, ThermalResult};
 

@@ -9,12 +9,8 @@ pub(super) mod poses;
 pub(super) mod trace;
 
 use maud::{Markup, html};
-use mimu::calibration::Calibration;
 use mimu::calibration::verify::{Verification, WholeTurnsOfAxis};
-use mimu::data_sheet::DataSheet;
-use mimu::noise::noise_file::NoiseFile;
-use mimu::prepared::Prepared;
-use mimu::result::diagnosis::DiagnosisResult;
+use mimu::{Calibration, DataSheet, DiagnosisResult, NoiseFile, Prepared};
 
 pub use heading::Particulars;
 

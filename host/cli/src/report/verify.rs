@@ -2,10 +2,7 @@
 
 use maud::{Markup, html};
 use mimu::calibration::verify::{SensorVerification, Verification, WholeTurnsOfAxis};
-use mimu::judgement::JudgementKind;
-use mimu::quantity::{AXES, Figure, plural, plus_minus, significant};
-use mimu::readable;
-use mimu::warning::Warning;
+use mimu::{AXES, Figure, JudgementKind, Warning, plural, plus_minus, readable, significant};
 
 use super::page::{Level, judged, kinds, warnings};
 use super::table::{interval, known, number, table, with_unit};

@@ -2,8 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use mimu_recording::error::{Error, Result};
-use mimu_recording::{Batch, Columns, Growing, Manifest, Restart, SampleFormat};
+use mimu_recording::{Batch, Columns, Error, Growing, Manifest, Restart, Result, SampleFormat};
 
 use super::clock::{Clock, seconds};
 use super::known::Known;

@@ -2,8 +2,7 @@
 
 use std::path::Path;
 
-use mimu_recording::error::{Error, Result};
-use mimu_recording::{ReferenceError, parse_toml, read_text};
+use mimu_recording::{Error, ReferenceError, Result, parse_toml, read_text};
 use serde::Deserialize;
 
 use super::Limits;

@@ -4,8 +4,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use mimu_device::patience;
-use mimu_recording::ReferenceError;
-use mimu_recording::error::{Error, Result};
+use mimu_recording::{Error, ReferenceError, Result};
 use nalgebra::Vector3;
 
 use super::Driver;

@@ -1,10 +1,8 @@
 //! Effects in the header: their regressors as C expressions.
 
-use mimu::calibration::Calibration;
-use mimu::effects::fitted::FittedEffect;
 use mimu::effects::quantity::Quantity;
 use mimu::effects::regressor::{Product, Regressor};
-use mimu::quantity::{PerSensor, Sensor};
+use mimu::{Calibration, FittedEffect, PerSensor, Sensor};
 use mimu_core::die::BEYOND_C;
 use mimu_core::effects::{Directions, RATE_LAG_S};
 use mimu_recording::error::{Error, Result};
@@ -89,10 +87,8 @@ impl Effects {
     pub fn values(&self) -> Value {
         let removed = self.sensors().filter_map(|sensor| {
             let directions = self.directions[sensor].as_ref()?;
-            let (own, inputs) = match sensor {
-                Sensor::Gyro => ("rate", "clean, read_force"),
-                Sensor::Accel => ("force", "read_rate, clean"),
-            };
+            let (own, inputs) =
+                sensor.pick(("rate", "clean, read_force"), ("force", "read_rate, clean"));
             let errors = self.errors[sensor].iter().enumerate();
             let errors = errors.map(|(axis, terms)| match terms.is_empty() {
                 true => json!({"axis": axis, "sum": "0.0f"}),

@@ -9,11 +9,8 @@
 
 use std::fmt::Write as _;
 
-use mimu::calibration::Calibration;
-use mimu::calibration::body::BodyTriad;
-use mimu::quantity::PerSensor;
-use mimu_recording::error::Result;
-use mimu_recording::{TriadKind, TriadName};
+use mimu::{BodyTriad, Calibration, PerSensor};
+use mimu_recording::{Result, TriadKind, TriadName};
 use nalgebra::{Matrix3, Matrix4, Vector3};
 
 use super::{KEYS, Kalibr, Options};

@@ -10,8 +10,7 @@ use crate::calibration::{Calibration, Curves};
 use crate::quantity::{AXES, Sensor};
 use crate::readable::STANDARD_GRAVITY;
 use crate::triad::Forward;
-use mimu_recording::RawUnit;
-use mimu_recording::error::{Error, Result};
+use mimu_recording::{Error, RawUnit, Result};
 
 /// Temperatures at which a cubic is fitted and judged.
 const POINTS: usize = 401;
@@ -185,10 +184,7 @@ impl BiasCubics {
 
     /// Largest input that the remainders are given for, SI.
     pub fn input(sensor: Sensor) -> f64 {
-        match sensor {
-            Sensor::Gyro => 100f64.to_radians(),
-            Sensor::Accel => STANDARD_GRAVITY,
-        }
+        sensor.pick(100f64.to_radians(), STANDARD_GRAVITY)
     }
 }
 
@@ -354,10 +350,7 @@ fn linear(
         off.component_div(&gain) * input
     };
     let cross = |m: &Forward| across(&(m.matrix - settled.matrix));
-    let condition = match sensor {
-        Sensor::Gyro => "at 100 deg/s",
-        Sensor::Accel => "at 1 g",
-    };
+    let condition = sensor.pick("at 100 deg/s", "at 1 g");
     let scales: Vec<_> = models.iter().map(scale).collect();
     let crosses: Vec<_> = models.iter().map(cross).collect();
     let over = |source, errors: &[Vector3<f64>]| match biases_only {

@@ -13,9 +13,8 @@ use crate::judgement::Judgement;
 use crate::one_unit::are_others;
 use crate::quantity::{AXES, Sensor};
 use crate::triad::Forward;
-use mimu_recording::error::{Error, Result};
 use mimu_recording::statistics::mean_and_variance;
-use mimu_recording::{NORMAL_95, RawUnit, TriadName};
+use mimu_recording::{Error, NORMAL_95, RawUnit, Result, TriadName};
 
 /// Probability that any parameter is named as changed although none has changed.
 const FALSE_CHANGE: f64 = 0.05;
@@ -324,10 +323,7 @@ fn parameters(calibration: &Calibration, temperatures: &[f64]) -> Vec<Named> {
 }
 
 fn name_of(sensor: Sensor) -> TriadName {
-    match sensor {
-        Sensor::Gyro => TriadName::GYRO,
-        Sensor::Accel => TriadName::ACCEL,
-    }
+    sensor.pick(TriadName::GYRO, TriadName::ACCEL)
 }
 
 /// C, o, rotation, delay and lever arm of a further triad.

@@ -5,8 +5,7 @@ use super::{Calibration, FIGURE_DIGITS, Judged, Origin, OverTemperature};
 use crate::judgement::Judgement;
 use crate::quantity::{Figure, PerSensor, Sensor, rounded};
 use crate::triad::Triad;
-use mimu_recording::error::Result;
-use mimu_recording::{RawUnit, Reference, SensorSettings};
+use mimu_recording::{Result, SensorSettings};
 
 /// A triad at the temperature of one node, with the error figures of its curves.
 #[derive(Debug, Clone)]
@@ -36,16 +35,8 @@ pub struct CurvesOfUnit {
     pub unit_id: Option<String>,
     /// Its sensors as they were set, if they are known.
     pub sensors: Option<SensorSettings>,
-    /// SHA-256 of the samples of the first recording.
-    pub sha256: String,
-    /// Unit of the readings.
-    pub raw_unit: RawUnit,
-    /// What was known of the input.
-    pub reference: Reference,
-    /// Local gravity, m/s².
-    pub gravity_mps2: f64,
-    /// Temperature of the dies that `triads` are for, °C.
-    pub temp_c: f64,
+    /// The first recording, and the temperature of the dies that `triads` are for.
+    pub recording: Origin,
     /// The triads at that temperature.
     pub triads: PerSensor<Option<TriadOfCurves>>,
     /// The models at all temperatures.
@@ -77,18 +68,10 @@ impl Calibration {
             Some(triad_table(
                 &found.triad,
                 sensor,
-                unit.raw_unit,
+                unit.recording.raw_unit,
                 frame,
                 judged,
             ))
-        };
-        let recording = Origin {
-            sha256: Some(unit.sha256.clone()).filter(|s| !s.is_empty()),
-            reference: Some(unit.reference),
-            gravity_mps2: Some(unit.gravity_mps2),
-            temp_c: Some(unit.temp_c),
-            temp_range_c: Some(unit.temperature.range_c),
-            ..Origin::of(unit.raw_unit)
         };
         let calibration = Self {
             format: Self::format_of(true).into(),
@@ -99,7 +82,7 @@ impl Calibration {
             gyro: table(Sensor::Gyro),
             accel: table(Sensor::Accel),
             temperature: Some(unit.temperature),
-            ..Self::empty(&unit.device, recording)
+            ..Self::empty(&unit.device, unit.recording.clone())
         };
         calibration.checked(&format!("calibration of {:?}", unit.device))
     }

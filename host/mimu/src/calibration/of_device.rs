@@ -12,8 +12,7 @@ use super::{
 use crate::effects::fitted::FittedEffect;
 use crate::quantity::{PerSensor, Sensor};
 use crate::triad::Triad;
-use mimu_recording::error::{Error, Result};
-use mimu_recording::{Manifest, RawUnit, SensorSettings};
+use mimu_recording::{Error, Manifest, RawUnit, Result, SensorSettings};
 
 /// The part of a calibration that a device stores: unrounded numbers of single precision.
 #[derive(Debug, Clone)]

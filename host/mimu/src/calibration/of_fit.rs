@@ -12,9 +12,9 @@ use crate::effects::fitted::FittedEffect;
 use crate::fit::{Fit, SensorFit};
 use crate::judgement::Judgement;
 use crate::quantity::{PerSensor, Sensor, inverse_names, rounded};
+use crate::signal::blocks::extent;
 use crate::triad::{Angles, Covariance, Estimate, Forward, Physical, Triad};
-use mimu_recording::error::Result;
-use mimu_recording::{Manifest, RawUnit, Reference};
+use mimu_recording::{Manifest, RawUnit, Reference, Result};
 
 /// Digits of standard deviations and intervals.
 const SIGMA_DIGITS: usize = 4;
@@ -38,13 +38,10 @@ impl Calibration {
             effects: lasting.collect(),
             ..Self::without_triads(&fit.prepared.manifest, Judgement::of_fit(fit), created)
         };
-        let dwells = fit.prepared.dwells.list.iter();
-        let temperatures = dwells.map(|d| d.temp_c).filter(|t| is_temperature(*t));
-        let temperatures: Vec<f64> = temperatures.collect();
-        let mean = temperatures.iter().sum::<f64>() / temperatures.len() as f64;
         let recording = &mut calibration.recording;
-        recording.temp_c = mean.is_finite().then_some(mean);
-        recording.temp_range_c = range(&temperatures);
+        recording.temp_c = mean_temperature(fit);
+        let range_c = extent(temperatures(fit));
+        recording.temp_range_c = recording.temp_c.map(|_| range_c);
         // A recording in memory has none.
         let sha256 = &fit.prepared.condensed.sha256;
         recording.sha256 = Some(sha256.clone()).filter(|sha| !sha.is_empty());
@@ -90,11 +87,16 @@ impl Calibration {
     }
 }
 
-/// The coldest and the warmest, °C.
-fn range(temperatures: &[f64]) -> Option<[f64; 2]> {
-    let mut all = temperatures.iter().copied();
-    let first = all.next()?;
-    Some(all.fold([first; 2], |[a, b], t| [a.min(t), b.max(t)]))
+/// Temperatures of the dwells, °C, as far as they are known.
+fn temperatures(fit: &Fit) -> impl Iterator<Item = f64> {
+    let dwells = fit.prepared.dwells.list.iter();
+    dwells.map(|d| d.temp_c).filter(|t| is_temperature(*t))
+}
+
+/// Their mean, if any is known.
+pub(super) fn mean_temperature(fit: &Fit) -> Option<f64> {
+    let mean = temperatures(fit).sum::<f64>() / temperatures(fit).count() as f64;
+    mean.is_finite().then_some(mean)
 }
 
 fn table(fit: &Fit, found: &SensorFit) -> TriadTable {

@@ -7,7 +7,6 @@ use crate::judgement::{Judgement, JudgementKind};
 use crate::quantity::{PerSensor, Sensor};
 use crate::sessions::{CommonTriad, Sessions};
 use crate::triad::Triad;
-use mimu_core::table::is_temperature;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::statistics::root_mean_square;
 
@@ -68,10 +67,7 @@ impl Calibration {
     }
 
     fn table_mut(&mut self, sensor: Sensor) -> &mut Option<TriadTable> {
-        match sensor {
-            Sensor::Gyro => &mut self.gyro,
-            Sensor::Accel => &mut self.accel,
-        }
+        sensor.pick(&mut self.gyro, &mut self.accel)
     }
 }
 
@@ -80,17 +76,10 @@ fn origins(sessions: &Sessions) -> Vec<SessionOrigin> {
     each.map(|(fit, used)| SessionOrigin {
         sha256: fit.prepared.condensed.sha256.clone(),
         used: *used,
-        temp_c: mean_temperature(fit),
+        temp_c: of_fit::mean_temperature(fit),
         judgement: Judgement::of_fit(fit),
     })
     .collect()
-}
-
-/// Mean temperature of the dwells, °C, if known.
-fn mean_temperature(fit: &crate::fit::Fit) -> Option<f64> {
-    let all = fit.prepared.dwells.list.iter().map(|d| d.temp_c);
-    let all: Vec<f64> = all.filter(|t| is_temperature(*t)).collect();
-    (!all.is_empty()).then(|| all.iter().sum::<f64>() / all.len() as f64)
 }
 
 /// The table of the last used session that has the triad, with the common model in place of its own.

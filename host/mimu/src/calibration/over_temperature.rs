@@ -156,10 +156,7 @@ impl NodeTable {
 impl TemperatureNode {
     /// The table of `sensor`.
     pub fn table(&self, sensor: Sensor) -> Option<&NodeTable> {
-        match sensor {
-            Sensor::Gyro => self.gyro.as_ref(),
-            Sensor::Accel => self.accel.as_ref(),
-        }
+        sensor.pick(self.gyro.as_ref(), self.accel.as_ref())
     }
 }
 

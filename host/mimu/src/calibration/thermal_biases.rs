@@ -14,11 +14,10 @@ use super::check::{problem_of_range, problem_of_temperature};
 use super::{DieTable, Origin};
 use crate::judgement::Judgement;
 use crate::quantity::{PerSensor, Sensor};
-use mimu_recording::error::{Error, Result};
-use mimu_recording::parse_toml;
+use mimu_recording::{Error, Result, parse_toml};
 
 /// Version of the layout.
-const FORMAT: &str = "mimu-thermal-biases/1";
+pub const FORMAT: &str = "mimu-thermal-biases/1";
 
 const HEADER: &str = "\
 # Biases over temperature of a unit at rest, and nothing else: scale factors and misalignments were not estimated, so this is no calibration.
@@ -34,7 +33,7 @@ const HEADER: &str = "\
 #[serde(deny_unknown_fields)]
 pub struct ThermalBiases {
     /// `mimu-thermal-biases/1`.
-    format: String,
+    pub format: String,
     /// Unit that it is for.
     pub device: String,
     /// The unit's own number, if it is known.
@@ -57,7 +56,7 @@ pub struct ThermalBiases {
     pub dies: PerSensor<DieTable>,
     /// One to sixteen, the coldest first.
     #[serde(rename = "node", default)]
-    nodes: Vec<BiasNode>,
+    pub nodes: Vec<BiasNode>,
 }
 
 /// Readings at rest at one temperature of the dies.
@@ -122,57 +121,11 @@ pub fn is_one(text: &str) -> bool {
 impl BiasNode {
     /// The reading of `sensor`.
     pub fn reading(&self, sensor: Sensor) -> Option<&RestReading> {
-        match sensor {
-            Sensor::Gyro => self.gyro.as_ref(),
-            Sensor::Accel => self.accel.as_ref(),
-        }
+        sensor.pick(self.gyro.as_ref(), self.accel.as_ref())
     }
-}
-
-/// The contents of such a file.
-#[derive(Debug, Clone)]
-pub struct RestOfUnit {
-    /// Name of the unit.
-    pub device: String,
-    /// Its own number, if it is known.
-    pub unit_id: Option<String>,
-    /// The recording that it was made from.
-    pub recording: Origin,
-    /// Dies' temperatures, °C.
-    pub range_c: [f64; 2],
-    /// What is known of the dies; hysteresis raw.
-    pub dies: PerSensor<DieTable>,
-    /// The judgement of the curves.
-    pub judgement: Judgement,
-    /// As in [`ThermalBiases::rms`].
-    pub rms: PerSensor<Option<f64>>,
-    /// Readings, the coldest first.
-    pub nodes: Vec<BiasNode>,
 }
 
 impl ThermalBiases {
-    /// The file of `unit`, made at `created` (RFC 3339).
-    ///
-    /// # Errors
-    /// Nodes that cannot be evaluated.
-    pub fn of(unit: RestOfUnit, created: &str) -> Result<Self> {
-        let place = format!("biases of {:?}", unit.device);
-        let made = Self {
-            format: FORMAT.into(),
-            device: unit.device,
-            unit_id: unit.unit_id,
-            created: created.into(),
-            tool: super::TOOL.into(),
-            judgement: unit.judgement,
-            rms: unit.rms,
-            range_c: unit.range_c,
-            recording: unit.recording,
-            dies: unit.dies,
-            nodes: unit.nodes,
-        };
-        made.checked(&place)
-    }
-
     /// Parses and checks the text of a file; `place` is its path.
     ///
     /// # Errors
@@ -217,7 +170,11 @@ impl ThermalBiases {
         table.map(RestCurves).map_err(|refused| refused.to_string())
     }
 
-    fn checked(self, place: &str) -> Result<Self> {
+    /// This file, if it can be evaluated; `place` is its path.
+    ///
+    /// # Errors
+    /// Another version; numbers that cannot be evaluated.
+    pub fn checked(self, place: &str) -> Result<Self> {
         let refuse = |problem: String| Err(wrong(place, problem));
         if self.format != FORMAT {
             let problem = format!(

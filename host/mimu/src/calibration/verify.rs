@@ -32,8 +32,8 @@ use crate::triad::Forward;
 use crate::turntable::RatedDwells;
 use crate::unseen::Test;
 use crate::warning::Warning;
-use mimu_recording::error::{Argument, Error, Result};
-use mimu_recording::{Manifest, Reference};
+use mimu_recording::error::Argument;
+use mimu_recording::{Error, Manifest, Reference, Result};
 
 /// Errors of one triad of a recording with and without a calibration. Figures as in [`Figure`].
 #[derive(Debug, Clone, Serialize)]

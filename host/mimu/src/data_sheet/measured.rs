@@ -204,8 +204,5 @@ fn scale(forward: &Forward) -> [f64; 3] {
 
 /// deg/s or g.
 fn of_sheet(sensor: Sensor, si: f64) -> f64 {
-    match sensor {
-        Sensor::Gyro => si.to_degrees(),
-        Sensor::Accel => si / STANDARD_GRAVITY,
-    }
+    sensor.pick(si.to_degrees(), si / STANDARD_GRAVITY)
 }

@@ -5,8 +5,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use crate::quantity::{AXES, Sensor};
-use mimu_recording::error::{Error, Result};
-use mimu_recording::{check_kind, parse_toml, read_text};
+use mimu_recording::{Error, Result, check_kind, parse_toml, read_text};
 
 /// Version of the file of a part.
 const FORMAT: &str = "mimu-part/1";
@@ -182,9 +181,6 @@ impl Part {
 
     /// Its limits for a sensor.
     pub fn sensor(&self, sensor: Sensor) -> Option<&PartSensor> {
-        match sensor {
-            Sensor::Gyro => self.gyro.as_ref(),
-            Sensor::Accel => self.accel.as_ref(),
-        }
+        sensor.pick(self.gyro.as_ref(), self.accel.as_ref())
     }
 }

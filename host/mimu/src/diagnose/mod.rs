@@ -47,8 +47,7 @@ use crate::quantity::{Sensor, significant};
 use crate::recording_problem::OfRecording;
 use crate::triad::{Covariance, Part, Triad};
 use crate::warning::Warning;
-use mimu_recording::error::{Error, Result};
-use mimu_recording::{RawUnit, Reference};
+use mimu_recording::{Error, RawUnit, Reference, Result};
 
 /// Result of a diagnosis in one word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, strum::IntoStaticStr)]

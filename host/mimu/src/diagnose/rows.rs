@@ -178,10 +178,7 @@ impl<'a> Session<'a> {
 
     /// Calibration of `sensor`.
     pub fn model(&self, sensor: Sensor) -> Option<Affine<f64>> {
-        match sensor {
-            Sensor::Gyro => self.gyro,
-            Sensor::Accel => self.accel,
-        }
+        sensor.pick(self.gyro, self.accel)
     }
 }
 

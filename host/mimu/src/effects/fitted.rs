@@ -90,10 +90,7 @@ impl FittedEffect {
     /// Whether it depends only on the input of its own sensor. Errors that depend on the converter's code do not count.
     pub fn is_of_own_input(&self) -> bool {
         let sensor = self.candidate.sensor;
-        let need = match sensor {
-            Sensor::Gyro => Need::Rate,
-            Sensor::Accel => Need::Force,
-        };
+        let need = sensor.pick(Need::Rate, Need::Force);
         let regressors = self.candidate.slot_regressors();
         let mut quantities = regressors.iter().flat_map(|r| r.quantities()).peekable();
         let any = quantities.peek().is_some();

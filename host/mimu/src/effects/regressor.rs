@@ -133,10 +133,7 @@ impl Product {
         let across = self
             .parts()
             .any(|(q, _)| matches!(q, Quantity::Rate(_) | Quantity::Force(_)));
-        let (base, first) = match sensor {
-            Sensor::Gyro => ("rad/s", 1),
-            Sensor::Accel => ("m/s^2", 2),
-        };
+        let (base, first) = sensor.pick(("rad/s", 1), ("m/s^2", 2));
         let mut unit = match (own, seconds) {
             (1, _) if across && kelvins > 0 => "rad".to_string(),
             (1.., _) => "1".into(),
@@ -148,10 +145,10 @@ impl Product {
             1 => unit += &format!("/{of}"),
             p => unit += &format!("/{of}^{p}"),
         };
-        let other = match sensor {
-            Sensor::Gyro => ("(m/s^2)", count(&|q| q.unit(sensor) == "m/s^2")),
-            Sensor::Accel => ("(rad/s)", rates),
-        };
+        let other = sensor.pick(
+            ("(m/s^2)", count(&|q| q.unit(sensor) == "m/s^2")),
+            ("(rad/s)", rates),
+        );
         over(other.0, other.1);
         over(&format!("({base})"), own.saturating_sub(1));
         over("K", kelvins);
@@ -249,10 +246,7 @@ impl Regressor {
         let Self::Product(own) = self else {
             return false;
         };
-        let along = match sensor {
-            Sensor::Gyro => Quantity::Rate(axis),
-            Sensor::Accel => Quantity::Force(axis),
-        };
+        let along = sensor.pick(Quantity::Rate(axis), Quantity::Force(axis));
         let of_body = |product: &Product| {
             let parts = product.parts().map(|(q, p)| match q {
                 Quantity::Input => (along, p),

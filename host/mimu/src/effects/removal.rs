@@ -16,8 +16,7 @@ use crate::signal::dwell::{Dwell, Fault};
 use crate::signal::increment::Increment;
 use crate::triad::directions;
 use crate::warning::Warning;
-use mimu_recording::Reference;
-use mimu_recording::error::{Error, Result};
+use mimu_recording::{Error, Reference, Result};
 
 /// Errors of the axes of the sensor under some conditions, SI. For effects with a lag, the conditions have to contain the temperature behind that
 /// lag.
@@ -235,10 +234,7 @@ impl<'a> Removal<'a> {
         force: Vector3<f64>,
     ) -> Conditions {
         let block = &self.blocks()[at];
-        let input = match self.sensor {
-            Sensor::Gyro => rate,
-            Sensor::Accel => force,
-        };
+        let input = self.sensor.pick(rate, force);
         Conditions {
             session: 0,
             t_s: t_s - self.t0_s,
@@ -257,10 +253,7 @@ impl<'a> Removal<'a> {
     /// The conditions without `error` of the sensor.
     fn without(&self, at: &Conditions, error: &Vector3<f64>) -> Conditions {
         let mut clean = *at;
-        let input = match self.sensor {
-            Sensor::Gyro => &mut clean.rate,
-            Sensor::Accel => &mut clean.force,
-        };
+        let input = self.sensor.pick(&mut clean.rate, &mut clean.force);
         *input -= self.to_body * error;
         clean.sensed = self.direction * *input;
         clean
@@ -344,10 +337,7 @@ impl<'a> Removal<'a> {
 
 /// If an effect depends on the other triad, a dwell without readings of that triad cannot be used for this one.
 fn leave_out_unknown(sensor: Sensor, effects: &[&FittedEffect], out: &mut Prepared) {
-    let (other, need) = match sensor {
-        Sensor::Gyro => (Sensor::Accel, Need::Force),
-        Sensor::Accel => (Sensor::Gyro, Need::Rate),
-    };
+    let (other, need) = sensor.pick((Sensor::Accel, Need::Force), (Sensor::Gyro, Need::Rate));
     let Some(effect) = effects.iter().find(|e| e.candidate.needs(need)) else {
         return;
     };

@@ -148,10 +148,7 @@ pub enum Addition {
 impl Addition {
     /// What to add for `sensor`, as a sentence fragment. A level pose has a force along an axis and no rate about it.
     pub fn words(self, sensor: Sensor) -> String {
-        let inputs = match sensor {
-            Sensor::Gyro => "rates",
-            Sensor::Accel => "forces",
-        };
+        let inputs = sensor.pick("rates", "forces");
         match self {
             Self::Inputs(axes) => {
                 format!("add dwells with {inputs} along {axes}, in both directions")

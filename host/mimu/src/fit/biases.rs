@@ -13,8 +13,7 @@ use crate::quantity::Figure;
 use crate::quantity::Sensor;
 use crate::triad::{Covariance, Part, Triad};
 use crate::warning::Warning;
-use mimu_recording::Reference;
-use mimu_recording::error::{Error, Result};
+use mimu_recording::{Error, Reference, Result};
 
 /// The uncertainty that a given C, with this covariance by rows, causes in a model whose biases were fitted beside it. At the mean reading the fitted
 /// bias cancels the error of the matrix.

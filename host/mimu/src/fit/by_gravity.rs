@@ -21,8 +21,7 @@ use crate::signal::blocks::quantile;
 use crate::signal::dwell::Fault;
 use crate::triad::{Covariance, Part, Triad};
 use crate::warning::Warning;
-use mimu_recording::error::{Error, Result};
-use mimu_recording::{RawUnit, Reference};
+use mimu_recording::{Error, RawUnit, Reference, Result};
 
 pub(super) fn fit_gravity(
     prepared: &Prepared,

@@ -15,8 +15,7 @@ use crate::quantity::{AXES, Figure, Sensor, plus_minus};
 use crate::readable;
 use crate::triad::{Angles, Covariance, Triad};
 use crate::warning::Warning;
-use mimu_recording::Reference;
-use mimu_recording::error::{Argument, Result};
+use mimu_recording::{Argument, Reference, Result};
 
 /// A parameter is undetermined if half of its 95 % interval exceeds this: relative for a scale factor, in rad for an angle. Data sheets promise a
 /// scale factor to within ten per cent and a mounting to within some degrees, which is better than a fifth.

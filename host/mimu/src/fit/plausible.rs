@@ -12,9 +12,8 @@ use crate::prepared::Prepared;
 use crate::quantity::{Figure, Sensor, significant};
 use crate::signal::unit_in_si::restless;
 use crate::warning::Warning;
-use mimu_recording::error::{Error, Result};
 use mimu_recording::health::{Against, accel_gain, gyro_gain, not_counts};
-use mimu_recording::{RawUnit, Reference};
+use mimu_recording::{Error, RawUnit, Reference, Result};
 
 /// If the error of a fit over the spread of its inputs exceeds this, the readings do not follow the inputs. Swapped sensors are beyond one; the worst
 /// table is a hundred times below.

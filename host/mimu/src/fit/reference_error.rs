@@ -12,8 +12,7 @@ use crate::prepared::Prepared;
 use crate::quantity::Sensor;
 use crate::signal::dwell::Dwell;
 use crate::triad::{Covariance, Part, Triad, vector};
-use mimu_recording::error::{Error, Result};
-use mimu_recording::{NORMAL_95, Reference, ReferenceError};
+use mimu_recording::{Error, NORMAL_95, Reference, ReferenceError, Result};
 
 /// What errs in the reference.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, strum::IntoStaticStr)]

@@ -45,8 +45,7 @@ use component::{FILTER, REFERENCE_COUNT};
 use estimates::Smoothed;
 use likelihood::{Model, Session};
 use mimu_allan::model::Term;
-use mimu_recording::Recording;
-use mimu_recording::error::{Error, Result};
+use mimu_recording::{Error, Recording, Result};
 
 /// Fewer segments show no variance.
 const FEWEST_SEGMENTS: usize = 6;

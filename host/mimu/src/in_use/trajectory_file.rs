@@ -5,8 +5,7 @@ use std::path::Path;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use super::estimates::Smoothed;
-use mimu_recording::error::{Error, Result};
-use mimu_recording::read_text;
+use mimu_recording::{Error, Result, read_text};
 
 /// Attitude (body to the frame of the reference) and position, m, at an instant.
 #[derive(Debug, Clone, Copy)]

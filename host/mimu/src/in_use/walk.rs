@@ -8,8 +8,7 @@ use crate::calibration::Calibration;
 use crate::calibration::apply::Compensated;
 use crate::quantity::{PerSensor, Sensor};
 use crate::triad::Forward;
-use mimu_recording::error::Result;
-use mimu_recording::{Batch, Recording};
+use mimu_recording::{Batch, Recording, Result};
 
 /// Longest interval in which samples are lost that is followed, s: no variance allows for what the unit did in it.
 const BRIDGED_S: f64 = 0.025;

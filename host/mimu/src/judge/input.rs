@@ -12,7 +12,7 @@ use mimu_recording::health::Fault;
 /// `Untested`: the data cannot contradict the result.
 pub fn of_warning(warning: &Warning) -> Option<JudgementKind> {
     match warning {
-        Warning::Of { warning, .. } | Warning::Channel { warning, .. } => of_warning(warning),
+        Warning::Of(_, warning) | Warning::Channel(_, warning) => of_warning(warning),
         Warning::CalibrationOfOther { .. }
         | Warning::NoisierThanGyros { .. }
         | Warning::ImplausibleRate { .. }

@@ -9,8 +9,7 @@ use crate::quantity::Sensor;
 use crate::toml_layout::to_toml;
 use mimu_allan::model::{FLOOR, Term};
 use mimu_allan::variance::AllanModel;
-use mimu_recording::error::{Argument, Error, Result};
-use mimu_recording::{RAW_COLUMNS, check_kind, parse_toml, read_text};
+use mimu_recording::{Argument, Error, RAW_COLUMNS, Result, check_kind, parse_toml, read_text};
 
 /// Version of the noise file.
 pub const NOISE_FORMAT: &str = "mimu-noise/1";

@@ -184,10 +184,7 @@ impl Setup {
 
     /// Noise of a sensor.
     pub fn noise_of(&self, sensor: Sensor) -> &DwellNoise {
-        match sensor {
-            Sensor::Gyro => &self.noise[0],
-            Sensor::Accel => &self.noise[1],
-        }
+        sensor.pick(&self.noise[0], &self.noise[1])
     }
 }
 

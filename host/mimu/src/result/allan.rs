@@ -190,10 +190,7 @@ impl AllanResult {
         let warnings = surveys.iter().flat_map(|survey| {
             let named = |w: &Warning| match surveys.len() {
                 1 => w.clone(),
-                _ => Warning::In {
-                    recording: survey.recording.clone(),
-                    warning: Box::new(w.clone()),
-                },
+                _ => Warning::In(survey.recording.clone(), Box::new(w.clone())),
             };
             survey.warnings.iter().map(named).collect::<Vec<_>>()
         });

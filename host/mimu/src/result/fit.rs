@@ -282,10 +282,7 @@ impl LeftOutResult {
             from_step: dwells.list[l.from].step,
             to_step: dwells.list[l.to].step,
             error: l.error,
-            unit: match l.sensor {
-                Sensor::Gyro => "rad",
-                Sensor::Accel => "m/s^2",
-            },
+            unit: l.sensor.pick("rad", "m/s^2"),
             sigmas: l.sigmas,
         });
         left_out.collect()

@@ -68,19 +68,16 @@ impl PartClass {
                 bias: 0.023,
             },
         };
-        let typical = match sensor {
-            Sensor::Gyro => consumer.gyro,
-            Sensor::Accel => consumer.accel,
-        };
+        let typical = sensor.pick(consumer.gyro, consumer.accel);
         match self {
             Self::Consumer => typical,
             Self::Tactical => Typical {
                 scale: 0.1 * typical.scale,
                 angle: 0.1 * typical.angle,
-                bias: match sensor {
-                    Sensor::Gyro => 5f64.to_radians() / 3600.0,
-                    Sensor::Accel => 0.5e-3 * crate::readable::STANDARD_GRAVITY,
-                },
+                bias: sensor.pick(
+                    5f64.to_radians() / 3600.0,
+                    0.5e-3 * crate::readable::STANDARD_GRAVITY,
+                ),
             },
         }
     }

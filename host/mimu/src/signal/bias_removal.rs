@@ -48,10 +48,7 @@ fn rests(blocks: &[Block], changes: f64) -> Option<Vec<Range<usize>>> {
     }
     let is_still = |b: &Block, sensor: Sensor| {
         let of_channel = |c: usize| {
-            let change = match sensor {
-                Sensor::Gyro => (changes * b.raw[c].mean).powi(2),
-                Sensor::Accel => 0.0,
-            };
+            let change = sensor.pick((changes * b.raw[c].mean).powi(2), 0.0);
             b.raw[c].n > 1 && variance(b, c) <= (STILL * floor[c]).max(change)
         };
         sensor.channels().all(of_channel)

@@ -13,10 +13,9 @@ pub(crate) use crate::signal::moments::pool;
 pub use crate::signal::moments::{Moments, Rails};
 use crate::signal::quantisation_step::QuantisationFinder;
 use crate::warning::Warning;
-use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::health::{At, Finding, HeldReadings, SignedLowByteFinder, Temperatures};
 pub(crate) use mimu_recording::statistics::{OF_MEDIAN, quantile};
-use mimu_recording::{Batch, Column, RAW_COLUMNS, Recording};
+use mimu_recording::{Argument, Batch, Column, Error, RAW_COLUMNS, Recording, Result};
 
 /// Length of a block, s: a tenth of the shortest usable dwell, ten samples at 100 Hz.
 const BLOCK_S: f64 = 0.1;

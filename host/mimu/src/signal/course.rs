@@ -102,10 +102,7 @@ impl Course {
         let total: f64 = blocks.iter().map(rows).sum();
         let input = |sensor: Sensor| {
             let from = sensor.channels().start;
-            let unit = match sensor {
-                Sensor::Gyro => 1f64.to_radians(),
-                Sensor::Accel => 1.0,
-            };
+            let unit = sensor.pick(1f64.to_radians(), 1.0);
             let level = |i: usize, k: usize| unit * condensed.blocks[i].reference[from + k].mean;
             let x: Vec<Vector3<f64>> = blocks
                 .iter()

@@ -17,8 +17,7 @@ use crate::signal::rest::{self, Rest};
 use crate::signal::slow_turns::{self, Reading};
 use crate::signal::stillness::{self, Detection, DwellSearch, Steps, reference_spans};
 use crate::warning::Warning;
-use mimu_recording::error::{Argument, Error, Result};
-use mimu_recording::{Manifest, Reference, health};
+use mimu_recording::{Argument, Error, Manifest, Reference, Result, health};
 
 /// Largest variance of a numbered dwell relative to the median of all: five times the standard deviation.
 const STEP_FACTOR: f64 = 25.0;

@@ -6,8 +6,7 @@ use crate::fault::SHORTEST_S;
 use crate::signal::blocks::Condensed;
 use crate::signal::rest;
 use crate::signal::stillness;
-use mimu_recording::Manifest;
-use mimu_recording::error::Result;
+use mimu_recording::{Manifest, Result};
 
 /// A file of which one dwell covers this share is that dwell.
 const WHOLE: f64 = 0.9;

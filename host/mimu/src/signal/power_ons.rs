@@ -5,8 +5,7 @@ use nalgebra::Vector3;
 use crate::quantity::Sensor;
 use crate::signal::blocks::{Condensed, quantile};
 use crate::signal::dwell::{Dwell, Dwells};
-use mimu_recording::Manifest;
-use mimu_recording::error::Result;
+use mimu_recording::{Manifest, Result};
 
 /// To which power-on the dwells of a recording belong.
 #[derive(Debug, Clone, Default, PartialEq)]

@@ -2,9 +2,8 @@
 
 use crate::signal::blocks::{Block, Condensed, Moments, Rails, extent, quantile};
 use crate::warning::Warning;
-use mimu_recording::error::{Error, Result};
 use mimu_recording::health::{Constant, Extreme, Fault, Finding, channel_run_by_chance};
-use mimu_recording::{Manifest, RAW_COLUMNS, RawUnit};
+use mimu_recording::{Error, Manifest, RAW_COLUMNS, RawUnit, Result};
 
 /// Longest run of equal samples that chance explains in channel `c`, from how often neighbours are equal while the channel works. `None` if
 /// most are equal: then there is no limit.

@@ -11,10 +11,8 @@ use crate::signal::change_point;
 use crate::signal::log_fault;
 use crate::signal::rate_at_rest::RateAtRest;
 use crate::signal::window::{Window, in_bursts, windows};
-use mimu_recording::error::{Error, Result};
-use mimu_recording::health;
 use mimu_recording::statistics::mean_and_variance;
-use mimu_recording::{Manifest, Reference};
+use mimu_recording::{Error, Manifest, Reference, Result, health};
 
 /// Length of the window whose variance decides on stillness, s. It is long enough for a slow turn to show in the accelerometer: the force
 /// changes linearly by g ω, a variance of (g ω)²/12, which with a noise of 7 mm/s² reaches [`STILL_FACTOR`] at 0.4 deg/s. It is short

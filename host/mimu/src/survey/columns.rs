@@ -1,7 +1,6 @@
 //! The columns of a recording, one at a time.
 
-use mimu_recording::error::Result;
-use mimu_recording::{Column, Recording};
+use mimu_recording::{Column, Recording, Result};
 
 /// Columns of a recording, each to be taken once.
 pub(super) struct Columns<'a> {

@@ -46,7 +46,7 @@ fn of_warning(warning: &Warning) -> Option<Judgement> {
         // Recordings and calibrations of one unit often have different names; another unit shows in the specific force.
         Warning::OtherDevice { .. } => None,
         Warning::Moves { .. } => Some(JudgementKind::Suspect),
-        Warning::Channel { warning, .. } if matches!(**warning, Warning::CoarseReadings { .. }) => {
+        Warning::Channel(_, warning) if matches!(**warning, Warning::CoarseReadings { .. }) => {
             Some(JudgementKind::Untested)
         }
         other => input::of_warning(other),

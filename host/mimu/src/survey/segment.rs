@@ -7,8 +7,7 @@ use super::columns::Columns;
 use crate::quantity::plural;
 use crate::signal::blocks::extent;
 use crate::warning::Warning;
-use mimu_recording::error::{Argument, Error, Result};
-use mimu_recording::{Column, Manifest, Recording};
+use mimu_recording::{Argument, Column, Error, Manifest, Recording, Result};
 
 /// Least number of samples: a model needs five octaves of averaging time up to a quarter of the record, and half the record.
 pub(super) const FEWEST: usize = 64;

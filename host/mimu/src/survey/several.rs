@@ -3,8 +3,7 @@
 use super::{Options, Survey, survey};
 use crate::calibration::Calibration;
 use crate::one_unit::{RAW_UNIT, SAMPLE_RATE, refuse_unlike};
-use mimu_recording::Recording;
-use mimu_recording::error::{Error, Result};
+use mimu_recording::{Error, Recording, Result};
 
 /// The noise of each recording; see [`survey`].
 ///

@@ -4,9 +4,8 @@ use super::segment::{FEWEST, Part, Segment, longest, segments};
 use crate::signal::blocks::{OF_MEDIAN, quantile};
 use crate::signal::stillness::{STILL_FACTOR, WINDOW_S};
 use crate::warning::Warning;
-use mimu_recording::RAW_COLUMNS;
-use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::health::{Fault, Finding, channel_run_by_chance};
+use mimu_recording::{Argument, Error, RAW_COLUMNS, Result};
 
 /// Properties of a channel before it is integrated.
 #[derive(Debug, Clone)]

@@ -48,9 +48,7 @@ pub(super) fn noise(channels: &[Channel]) -> Vec<Warning> {
         .iter()
         .filter(|c| c.unit.name == Sensor::Gyro.unit());
     let loud = si.filter_map(|c| white(c).filter(|n| *n > LOUDEST_GYRO).map(|n| (c.name, n)));
-    loud.map(|(name, n)| Warning::Channel {
-        channel: name,
-        warning: Box::new(Warning::NoisierThanGyros { white: n }),
-    })
-    .collect()
+    let warning = |white| Box::new(Warning::NoisierThanGyros { white });
+    loud.map(|(name, n)| Warning::Channel(name, warning(n)))
+        .collect()
 }

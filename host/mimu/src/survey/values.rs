@@ -6,9 +6,8 @@ use super::segment::{FEWEST, Part, Segment, longest};
 use super::suitability::{Suitability, suitability};
 use crate::survey::unit::Unit;
 use crate::warning::Warning;
-use mimu_recording::RAW_COLUMNS;
-use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::health::{Constant, Finding};
+use mimu_recording::{Argument, Error, RAW_COLUMNS, Result};
 
 /// What a channel is found to be.
 pub(super) enum Read {

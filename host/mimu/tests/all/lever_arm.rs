@@ -84,7 +84,7 @@ fn off(fit: &Fit) -> (f64, f64) {
 /// The place on the table of `warnings`, mm, with the halves of the 95 % intervals; `None` on the axis.
 fn place(warnings: &[Warning]) -> Option<[[f64; 3]; 2]> {
     let mut all = warnings.iter().map(|w| match w {
-        Warning::Of { warning, .. } => warning,
+        Warning::Of(_, warning) => warning,
         other => other,
     });
     all.find_map(|w| match w {

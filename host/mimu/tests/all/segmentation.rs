@@ -329,7 +329,7 @@ fn a_table_about_one_level_axis_calibrates_that_axis_and_names_what_stays_open()
             );
         }
         let open = fit.all_warnings().find_map(|w| match w {
-            Warning::Of { warning, .. } => match &**warning {
+            Warning::Of(_, warning) => match &**warning {
                 Warning::LeftOpen { parameters, .. } => Some(parameters.join(", ")),
                 _ => None,
             },

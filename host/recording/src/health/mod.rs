@@ -67,7 +67,8 @@ pub struct Rows {
     missing_docs,
     reason = "the comment of a variant says what its fields are"
 )]
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, strum::IntoStaticStr)]
+#[strum(serialize_all = "snake_case")]
 pub enum Fault {
     /// A logger faster than the sensor writes each reading several times: the rows in all, the mean number for each reading, and rows a second.
     Held {
@@ -138,14 +139,17 @@ pub enum Fault {
         at: Option<At>,
     },
     /// Temperatures, °C, at which no board is used.
+    #[strum(serialize = "temperatures")]
     UnusualTemperatures { low_c: f64, high_c: f64 },
     /// The column of the thermometer has zeros only.
     NoThermometer,
     /// Zeros of a thermometer that did not answer.
     SilentThermometer,
     /// From a row on the accelerometer has another range, and reads so many times as much.
+    #[strum(serialize = "log_fault")]
     RangeChanged { ratio: f64 },
     /// From a row on a column reads what another one read before.
+    #[strum(serialize = "log_fault")]
     ColumnsMoved {
         now: &'static str,
         before: &'static str,
@@ -180,36 +184,7 @@ impl Finding {
 
     /// Name of its kind, for scripts.
     pub fn kind(&self) -> &'static str {
-        match self.fault {
-            Fault::Held { .. } => "held",
-            Fault::Unanswered => "unanswered",
-            Fault::Dead { .. } => "dead",
-            Fault::DeadOrCoarse { .. } => "dead_or_coarse",
-            Fault::Stuck { .. } => "stuck",
-            Fault::EndOfConverter { .. } => "end_of_converter",
-            Fault::FullScale { .. } => "full_scale",
-            Fault::RunAtEnd { .. } => "run_at_end",
-            Fault::CalmEnd { .. } => "calm_end",
-            Fault::AtEnd => "at_end",
-            Fault::AllZero => "all_zero",
-            Fault::NoAnswer => "no_answer",
-            Fault::NoForce => "no_force",
-            Fault::NotConnected => "not_connected",
-            Fault::SeparateRows { .. } => "separate_rows",
-            Fault::NoGravity { .. } => "no_gravity",
-            Fault::NotSi { .. } => "not_si",
-            Fault::Turning { .. } => "turning",
-            Fault::NotCounts { .. } => "not_counts",
-            Fault::Unsigned => "unsigned",
-            Fault::Overflow => "overflow",
-            Fault::SignedLowByte => "signed_low_byte",
-            Fault::NoTemperatures { .. } => "no_temperatures",
-            Fault::UnusualTemperatures { .. } => "temperatures",
-            Fault::NoThermometer => "no_thermometer",
-            Fault::SilentThermometer => "silent_thermometer",
-            Fault::RangeChanged { .. } | Fault::ColumnsMoved { .. } => "log_fault",
-            Fault::Exchanged => "exchanged",
-        }
+        self.fault.into()
     }
 
     /// Why the recording at `place` is refused for it.

@@ -25,14 +25,19 @@ pub enum Decimal {
     Nanosecond,
 }
 
+/// Each in its order, with its symbol as it is written on the command line, its name, and how many make a second.
+const TABLE: [(Decimal, &str, &str, i64); 4] = [
+    (Decimal::Second, "s", "seconds", 1),
+    (Decimal::Millisecond, "ms", "milliseconds", 1_000),
+    (Decimal::Microsecond, "us", "microseconds", 1_000_000),
+    (Decimal::Nanosecond, "ns", "nanoseconds", 1_000_000_000),
+];
+
 impl Decimal {
     /// All of them.
-    pub const ALL: [Decimal; 4] = [
-        Decimal::Second,
-        Decimal::Millisecond,
-        Decimal::Microsecond,
-        Decimal::Nanosecond,
-    ];
+    pub fn all() -> impl Iterator<Item = Self> {
+        TABLE.into_iter().map(|(unit, ..)| unit)
+    }
 
     /// Its size, s.
     pub fn seconds(self) -> f64 {
@@ -41,22 +46,12 @@ impl Decimal {
 
     /// Its symbol, as it is written on the command line.
     pub fn symbol(self) -> &'static str {
-        match self {
-            Decimal::Second => "s",
-            Decimal::Millisecond => "ms",
-            Decimal::Microsecond => "us",
-            Decimal::Nanosecond => "ns",
-        }
+        TABLE[self as usize].1
     }
 
     /// How many make a second.
     pub fn per_second(self) -> i64 {
-        match self {
-            Decimal::Second => 1,
-            Decimal::Millisecond => 1_000,
-            Decimal::Microsecond => 1_000_000,
-            Decimal::Nanosecond => 1_000_000_000,
-        }
+        TABLE[self as usize].3
     }
 }
 
@@ -65,7 +60,7 @@ impl FromStr for Decimal {
 
     fn from_str(text: &str) -> Result<Self, Error> {
         let text = if text == "µs" { "us" } else { text };
-        let known = Decimal::ALL.into_iter().find(|unit| unit.symbol() == text);
+        let known = Decimal::all().find(|unit| unit.symbol() == text);
         known.ok_or_else(|| {
             let problem = format!("{} is not a unit of time stamps", shorten(text.as_bytes()));
             Error::new("unit of the times", problem, "give s, ms, us or ns")
@@ -75,11 +70,6 @@ impl FromStr for Decimal {
 
 impl fmt::Display for Decimal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Decimal::Second => "seconds",
-            Decimal::Millisecond => "milliseconds",
-            Decimal::Microsecond => "microseconds",
-            Decimal::Nanosecond => "nanoseconds",
-        })
+        f.write_str(TABLE[*self as usize].2)
     }
 }

@@ -20,8 +20,8 @@ use super::readings::{Choice, LogFormat, Readings, guarded};
 use crate::columns::Column;
 use crate::error::{Argument, Error, Result};
 use crate::triad_name::{TriadKind, TriadName};
-use calibration::{Parameters, Sensor};
-use topics::{TOPICS, Topic, u32_in};
+use calibration::Parameters;
+use topics::{TOPICS, Topic, field};
 
 /// Logs of PX4.
 pub(super) const ULG: LogFormat = LogFormat {
@@ -143,8 +143,8 @@ impl Log {
 
     fn select(&mut self, data: &DataMessage<'_>) -> Option<()> {
         let ids = [
-            u32_in(data, "gyro_device_id")?,
-            u32_in(data, "accel_device_id")?,
+            field(data, "gyro_device_id")?,
+            field(data, "accel_device_id")?,
         ];
         if self
             .selected
@@ -280,12 +280,10 @@ impl Log {
             );
             // Drivers that calibrate do so on the board's axes.
             let undone = match topic.calibrated {
-                true => Some(self.parameters.undo(
-                    Sensor::ALL[*sensor],
-                    &topic.devices,
-                    &topic.values,
-                    false,
-                )),
+                true => Some(
+                    self.parameters
+                        .undo(*sensor, &topic.devices, &topic.values, false),
+                ),
                 false => None,
             };
             for (row, stamp) in topic.stamps_ns.iter().enumerate() {
@@ -335,16 +333,15 @@ impl Log {
             let problem = "the log has no messages of inertial sensors";
             return Err(Error::new(path.display(), problem, "choose another log"));
         };
-        let undone = Sensor::ALL.map(|sensor| {
+        let undone = [0, 1].map(|sensor| {
             let selected = self.selected.iter();
-            let mut ids: Vec<(usize, u32)> = selected
-                .map(|(from, ids)| (*from, ids[sensor as usize]))
-                .collect();
+            let mut ids: Vec<(usize, u32)> =
+                selected.map(|(from, ids)| (*from, ids[sensor])).collect();
             if ids.is_empty() {
                 // Older logs do not name the sensor: if only one is calibrated, it is that one.
                 ids.extend(self.parameters.only_id(sensor).map(|id| (0, id)));
             }
-            let readings = [&combined.values, &combined.accel][sensor as usize];
+            let readings = [&combined.values, &combined.accel][sensor];
             self.parameters.undo(sensor, &ids, readings, true)
         });
         let mut readings = Readings::of_unit();

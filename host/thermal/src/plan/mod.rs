@@ -9,10 +9,8 @@ mod procedure;
 pub use prediction::{At, SensorPrediction};
 pub use procedure::{Procedure, Schedule};
 
-use mimu::plan::Plan;
 use mimu::plan::design::budget::DwellNoise;
-use mimu::plan::design::reach::Fixture;
-use mimu::quantity::{duration, significant};
+use mimu::{Fixture, Plan, duration, significant};
 use mimu_recording::error::{Argument, Error, Result};
 use serde::Serialize;
 

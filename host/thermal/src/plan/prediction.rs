@@ -1,8 +1,7 @@
 //! Standard deviations of the curves that a procedure gives, from the information matrix of the regression.
 
-use mimu::plan::design::reach::Fixture;
 use mimu::plan::{Plan, Planned};
-use mimu::quantity::Sensor;
+use mimu::{Fixture, Sensor};
 use mimu_recording::error::Result;
 use nalgebra::{DMatrix, DVector, Vector3};
 use serde::Serialize;
@@ -142,10 +141,10 @@ fn rows(
 /// Mean input in a step, SI, without the rate of the Earth; in a turn at its rate.
 fn input(step: &Planned, sensor: Sensor) -> Vector3<f64> {
     let input = step.input_over(step.length.as_secs_f64());
-    match sensor {
-        Sensor::Gyro => Vector3::from_column_slice(&input[..3]).map(f64::to_radians),
-        Sensor::Accel => Vector3::from_column_slice(&input[3..]),
-    }
+    sensor.pick(
+        Vector3::from_column_slice(&input[..3]).map(f64::to_radians),
+        Vector3::from_column_slice(&input[3..]),
+    )
 }
 
 /// Inverse of an information matrix whose columns have very different sizes; `None` if it is singular.

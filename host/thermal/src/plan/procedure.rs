@@ -1,10 +1,9 @@
 //! What chamber and table do in each procedure, and when.
 
 use mimu::plan::design::model::Setting;
-use mimu::plan::design::reach::Fixture;
 use mimu::plan::design::tour::Motion;
 use mimu::plan::{Step, TableAxis, chamber};
-use mimu::quantity::duration;
+use mimu::{Fixture, duration};
 use mimu_recording::error::{Argument, Error, Result};
 use nalgebra::Vector3;
 use serde::Serialize;
@@ -13,8 +12,9 @@ use super::Request;
 use crate::basis::Shape;
 
 /// Sequences of temperatures and motions.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, strum::IntoStaticStr)]
 #[serde(rename_all = "kebab-case")]
+#[strum(serialize_all = "kebab-case")]
 pub enum Procedure {
     /// Set points, at each of which the unit takes the chamber's temperature before it is measured: fang, section 3.
     Soak,
@@ -29,12 +29,7 @@ pub enum Procedure {
 impl Procedure {
     /// As on the command line.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Soak => "soak",
-            Self::Niu => "niu",
-            Self::Ramp => "ramp",
-            Self::RestRamp => "rest-ramp",
-        }
+        self.into()
     }
 }
 

@@ -1,15 +1,11 @@
 //! Diagnoses the remaining errors, and offers, verifies and stores the calibration with effects.
 
-use mimu::calibration::Calibration;
-use mimu::diagnose::{Recordings, diagnose};
-use mimu::effects::fitted::FittedEffect;
-use mimu::fit::{Fit, Options};
 use mimu::plan::next_experiment;
-use mimu::result::diagnosis::DiagnosisResult;
-use mimu::warning::Warning;
-use mimu_recording::Reference;
-use mimu_recording::error::Result;
+use mimu::{
+    Calibration, DiagnosisResult, Fit, FittedEffect, Options, Recordings, Warning, diagnose,
+};
 use mimu_recording::result_file::stage;
+use mimu_recording::{Reference, Result};
 
 use super::{AffineCalibration, OpenSession, WITH_EFFECTS, add_mounting_uncertainty, now};
 use crate::event::{Event, Phase, Question};

@@ -1,9 +1,8 @@
 //! Conditions of a dwell: samples arrive, the unit is at rest or turns steadily, and pose and rate are those of the requested dwell.
 
 use mimu::quantity::{Sensor, significant};
-use mimu_recording::RawUnit;
-use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::health::{Fault, Finding, accel_at_rest};
+use mimu_recording::{Argument, Error, RawUnit, Result};
 use nalgebra::Vector3;
 
 use super::{Round, UnitSession};

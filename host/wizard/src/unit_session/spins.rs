@@ -2,10 +2,9 @@
 
 use std::f64::consts::TAU;
 
-use mimu::prepared::Prepared;
-use mimu::quantity::significant;
 use mimu::signal::stillness::STILL_FACTOR;
 use mimu::spun::{End, Spun, is_clipped};
+use mimu::{Prepared, significant};
 use mimu_recording::error::Result;
 use mimu_recording::health::Fault;
 use nalgebra::Vector3;

@@ -1,6 +1,6 @@
 //! The definitions, term by term, and what follows from them.
 
-use mimu_allan::curve::{curve, curve_of_phase};
+use mimu_allan::curve::curve;
 use mimu_allan::{Deviation, Point, Spacing};
 
 use super::Random;
@@ -57,29 +57,6 @@ fn every_cluster_length_of_a_short_series_is_the_definition_term_by_term() {
             assert!((point.tau_s - 0.01 * m as f64).abs() < 1e-12);
             let error = point.deviation / deviation - 1.0;
             assert!(error.abs() < 1e-12, "{kind:?} at {m}: {error:.1e}");
-        }
-    }
-}
-
-#[test]
-fn the_phase_of_a_series_has_its_deviations() {
-    let rates = Random(3).white(5000);
-    let mut angle = 0.7;
-    let mut phase = vec![angle];
-    phase.extend(rates.iter().map(|rate| {
-        angle += 0.01 * rate;
-        angle
-    }));
-    for kind in [Deviation::Allan, Deviation::Modified, Deviation::Hadamard] {
-        let of_rates = curve(&rates, 0.01, kind, &Spacing::Octave, 0.95).expect("finite");
-        let of_phase = curve_of_phase(&phase, 0.01, kind, &Spacing::Octave, 0.95).expect("finite");
-        assert!(of_rates.len() > 10);
-        for (a, b) in of_rates.iter().zip(&of_phase) {
-            assert!(
-                (a.deviation / b.deviation - 1.0).abs() < 1e-9,
-                "{a:?} {b:?}"
-            );
-            assert_eq!((a.terms, a.alpha), (b.terms, b.alpha));
         }
     }
 }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use flate2::read::GzDecoder;
 use mimu_allan::bounds::{Estimator, Sampling, interval};
-use mimu_allan::curve::{curve, curve_of_phase};
+use mimu_allan::curve::curve;
 use mimu_allan::{Deviation, Point, Spacing};
 
 /// One line of a result.
@@ -93,19 +93,22 @@ fn lines(path: &Path) -> Vec<Line> {
         .collect()
 }
 
-/// The samples of a record, rates in units of the nominal frequency.
+/// The rates of a record, in units of the nominal frequency.
 fn samples(folder: &Path, record: &Record) -> Vec<f64> {
     // The quartz oscillator's are in hertz at 10 MHz.
     let unit = if record.name == QUARTZ.name { 1e7 } else { 1.0 };
-    rows(&text(&folder.join(record.name).join(record.file)))
+    let all: Vec<f64> = rows(&text(&folder.join(record.name).join(record.file)))
         .map(|v| v[0] / unit)
-        .collect()
+        .collect();
+    match record.phase {
+        true => all.windows(2).map(|w| w[1] - w[0]).collect(),
+        false => all,
+    }
 }
 
 /// Our points at the times of `lines`.
-fn points(samples: &[f64], phase: bool, kind: Deviation, lines: &[Line]) -> Vec<Point> {
+fn points(samples: &[f64], kind: Deviation, lines: &[Line]) -> Vec<Point> {
     let spacing = Spacing::Samples(lines.iter().map(|l| l.m).collect());
-    let curve = if phase { curve_of_phase } else { curve };
     curve(samples, 1.0, kind, &spacing, 0.683).expect("finite")
 }
 
@@ -153,7 +156,7 @@ fn deviations_at_all_times_agree_to_the_last_printed_digit() {
         for (kind, file) in KINDS.into_iter().zip(files) {
             let lines = lines(&folder.join(record.name).join(file));
             assert!(lines.len() > 100);
-            assert_deviations(&points(&samples, record.phase, kind, &lines), &lines);
+            assert_deviations(&points(&samples, kind, &lines), &lines);
         }
     }
 }
@@ -169,10 +172,9 @@ fn noise_is_identified_as_by_stable32_wherever_there_are_thirty_means() {
         let samples = samples(&folder, &record);
         for (kind, file) in KINDS.into_iter().zip(files) {
             let lines = lines(&folder.join(record.name).join(file));
-            let points = points(&samples, record.phase, kind, &lines);
-            let rates = samples.len() - usize::from(record.phase);
+            let points = points(&samples, kind, &lines);
             for (point, line) in points.iter().zip(&lines) {
-                if rates / point.m >= 30 {
+                if samples.len() / point.m >= 30 {
                     compared += 1;
                     if point.alpha != line.alpha {
                         differ.push((record.name, point.m, point.alpha, line.alpha));
@@ -221,16 +223,16 @@ fn bounds_are_those_of_stable32_for_the_noise_that_it_found() {
         let samples = samples(&folder, &record);
         for &(kind, file) in files {
             let lines = lines(&folder.join(record.name).join(file));
-            let points = points(&samples, record.phase, kind, &lines);
+            let points = points(&samples, kind, &lines);
             assert_deviations(&points, &lines);
             for (point, line) in points.iter().zip(&lines) {
-                assert_bounds(kind, point, line, record.phase);
+                assert_bounds(kind, point, line);
             }
         }
     }
 }
 
-fn assert_bounds(kind: Deviation, point: &Point, line: &Line, phase: bool) {
+fn assert_bounds(kind: Deviation, point: &Point, line: &Line) {
     let estimator = Estimator {
         kind,
         sampling: Sampling::Means,
@@ -250,11 +252,14 @@ fn assert_bounds(kind: Deviation, point: &Point, line: &Line, phase: bool) {
         error < tolerance,
         "{error:.1e}: {lower} {upper} {edf} {line:?}"
     );
-    if phase && point.alpha == line.alpha {
-        assert_eq!(point.edf, edf);
-        assert_eq!(
-            (point.lower, point.upper),
-            interval(point.deviation, edf, 0.683)
-        );
-    }
+    // Ours are of a sum of rates.
+    let own = Estimator {
+        sampling: Sampling::Instants,
+        ..estimator
+    };
+    assert_eq!(point.edf, own.edf(point.alpha));
+    assert_eq!(
+        (point.lower, point.upper),
+        interval(point.deviation, point.edf, 0.683)
+    );
 }

@@ -5,9 +5,8 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use mimu::quantity::{normal_gravity, plural};
-use mimu_recording::error::{Error, Result};
 use mimu_recording::units::STANDARD_GRAVITY;
-use mimu_recording::{UNNAMED, are_two_units};
+use mimu_recording::{Error, Result, UNNAMED, are_two_units};
 use mimu_station::boards::Boards;
 use mimu_station::gather::{Samples, Take};
 use mimu_wizard::source::Opener;

@@ -2,22 +2,18 @@
 
 use std::path::Path;
 
-use mimu::effects;
-use mimu::fit::{Fit, Options, fit};
-use mimu::noise::noise_file::NoiseFile;
 use mimu::plan::design::budget::DwellNoise;
 use mimu::plan::design::reach::{Fixture, RateList, Rates};
 use mimu::plan::design::tour::Motion;
 use mimu::plan::next_experiment::prediction::Target;
 use mimu::plan::next_experiment::{CHAMBER_C, DWELL_S, RATE_DPS, SLEW, Setup, smallest};
-use mimu::quantity::Sensor;
 use mimu::result::next_experiment::NextExperiment;
 use mimu::signal::stillness::STILL_FACTOR;
-use mimu_recording::Reference;
-use mimu_recording::error::{Error, Result};
+use mimu::{Fit, NoiseFile, Options, Sensor, effects, fit};
+use mimu_recording::{Error, Reference, Result};
 
 use super::{DesignArgs, NoiseArg};
-use crate::reading::{LogArgs, read};
+use crate::reading::{LogArgs, read_samples};
 
 /// Default sample rate without a recording, Hz.
 const SAMPLE_RATE_HZ: f64 = 1000.0;
@@ -123,13 +119,8 @@ impl DesignArgs {
 /// Fit of a recording of the unit.
 fn after(path: &Path, args: &DesignArgs) -> Result<Fit> {
     let outputs = [args.output.as_deref(), args.json.file()];
-    let prepared = read(
-        path,
-        &LogArgs::default(),
-        STILL_FACTOR.into(),
-        &outputs,
-        &[],
-    )?;
+    let (log, search) = (LogArgs::default(), STILL_FACTOR.into());
+    let (prepared, _) = read_samples(path, &log, search, &outputs, &[])?;
     let prepared = match &args.noise {
         Some(NoiseArg::File(file)) => prepared.with_noise(&NoiseFile::read(file)?)?,
         _ => prepared,

@@ -3,10 +3,8 @@
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use mimu::noise::noise_file::NoiseFile;
 use mimu::plan::design::budget::DwellNoise;
-use mimu::plan::design::reach::Fixture;
-use mimu::quantity::Sensor;
+use mimu::{Fixture, NoiseFile};
 use mimu_recording::error::Result;
 
 use super::DesignArgs;
@@ -40,10 +38,10 @@ impl DesignArgs {
     pub(super) fn noise(&self) -> Result<DwellNoise> {
         let at_rest = match &self.noise {
             Some(NoiseArg::File(path)) => {
-                DwellNoise::from_file(&NoiseFile::read(path)?, self.sensor())?
+                DwellNoise::from_file(&NoiseFile::read(path)?, self.sensor)?
             }
             other => {
-                let fang = DwellNoise::fang(self.sensor());
+                let fang = DwellNoise::fang(self.sensor);
                 let n = match other {
                     Some(NoiseArg::Density(n)) => *n,
                     _ => fang.n,
@@ -62,10 +60,7 @@ impl DesignArgs {
     /// Whose noise is assumed, if none is given.
     pub(super) fn assumed_noise(&self) -> Option<&'static str> {
         let given = self.sigma.is_some() || self.noise.is_some();
-        (!given).then_some(match self.sensor() {
-            Sensor::Gyro => "an ADXRS300",
-            Sensor::Accel => "an MMA7260QT",
-        })
+        (!given).then_some(self.sensor.pick("an ADXRS300", "an MMA7260QT"))
     }
 
     /// Length of a dwell, s.

@@ -5,15 +5,13 @@ use std::path::Path;
 use mimu::plan::design::Problem;
 use mimu::plan::design::fewest::{MOST, Widths};
 use mimu::plan::design::population::Population;
-use mimu::prior::Prior;
-use mimu::quantity::{Sensor, significant};
-use mimu::readable::STANDARD_GRAVITY;
+use mimu::plan::design::reach::Fixture;
 use mimu::result::design::Design;
-use mimu_recording::Reference;
-use mimu_recording::error::{Error, Result};
+use mimu::{Prior, STANDARD_GRAVITY, Sensor, significant};
+use mimu_recording::{Error, Reference, Result};
 use mimu_wizard::procedure::Targets;
 
-use super::{DesignArgs, TableArg};
+use super::DesignArgs;
 use crate::arguments::targets;
 
 impl DesignArgs {
@@ -48,7 +46,7 @@ impl DesignArgs {
                 "leave --prior out",
             );
         }
-        if self.sensor() == Sensor::Gyro {
+        if self.sensor == Sensor::Gyro {
             return refuse(
                 "--sensor gyro".into(),
                 "by hand a gyro's known inputs are the turns between dwells, which this command does not design",
@@ -62,13 +60,9 @@ impl DesignArgs {
                 "leave --reference out, or --prior: known inputs determine every parameter without it",
             );
         }
-        let fixture = match self.table {
-            None | Some(TableArg::Hand) => None,
-            Some(_) => Some(self.fixture().name()),
-        };
-        if let Some(name) = fixture {
+        if let Some(table) = self.table.filter(|table| *table != Fixture::Hand) {
             return refuse(
-                format!("--table {name}"),
+                format!("--table {}", table.name()),
                 by_hand,
                 "leave --table out, or --prior: on a table, known inputs determine every parameter without it",
             );

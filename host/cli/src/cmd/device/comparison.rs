@@ -6,14 +6,12 @@ use std::time::Duration;
 
 use crate::report;
 use clap::Args;
-use mimu::calibration::Calibration;
-use mimu::quantity::Sensor;
+use mimu::{Calibration, Sensor};
 use mimu_device::{DeviceResult, KalmanPlan, SHORTEST, check, kalman};
 use mimu_recording::error::{Error, Result};
 
-use super::{PortArgs, duration, open};
-use crate::arguments::JsonArgs;
-use crate::output::{check_outputs, print, progress};
+use super::{OnDevice, duration};
+use crate::output::{print, progress};
 
 #[derive(Args)]
 pub struct CheckArgs {
@@ -24,9 +22,7 @@ pub struct CheckArgs {
     #[arg(long = "for", value_name = "TIME", default_value = "5s", value_parser = duration)]
     duration: Duration,
     #[command(flatten)]
-    port: PortArgs,
-    #[command(flatten)]
-    json: JsonArgs,
+    on: OnDevice,
 }
 
 #[derive(Args)]
@@ -45,9 +41,7 @@ pub struct KalmanArgs {
     #[arg(long, value_name = "X,Y,Z", value_parser = triple)]
     noise_variance: Option<[f32; 3]>,
     #[command(flatten)]
-    port: PortArgs,
-    #[command(flatten)]
-    json: JsonArgs,
+    on: OnDevice,
 }
 
 fn triple(text: &str) -> std::result::Result<[f32; 3], String> {
@@ -63,10 +57,9 @@ fn triple(text: &str) -> std::result::Result<[f32; 3], String> {
 }
 
 pub fn run_check(args: &CheckArgs) -> Result<()> {
-    check_outputs(&[args.json.file()], &[&args.calibration])?;
     let place = args.calibration.display().to_string();
     let calibration = Calibration::read(&args.calibration)?;
-    let mut session = open(&args.port)?;
+    let mut session = args.on.open(Some(&args.calibration))?;
     let bar = progress("comparing");
     let found = check(&mut session, &calibration, &place, args.duration, |share| {
         bar.reach(share)
@@ -74,7 +67,7 @@ pub fn run_check(args: &CheckArgs) -> Result<()> {
     bar.finish();
     let port = session.port();
     let result = DeviceResult::new("check", port, found);
-    print(&args.json, &report::check_text(&result), &result, None)?;
+    print(&args.on.json, &report::check_text(&result), &result, None)?;
     match result.found.holds || !result.found.not_judged_for.is_empty() {
         true => Ok(()),
         false => Err(Error::new(
@@ -86,7 +79,6 @@ pub fn run_check(args: &CheckArgs) -> Result<()> {
 }
 
 pub fn run_kalman(args: &KalmanArgs) -> Result<()> {
-    check_outputs(&[args.json.file()], &[])?;
     let (sensor, inputs) = match args.rate_dps.is_empty() {
         true => (Sensor::Accel, args.force_mps2.clone()),
         false => {
@@ -107,14 +99,11 @@ pub fn run_kalman(args: &KalmanArgs) -> Result<()> {
         each: args.each,
         noise: args.noise_variance,
     };
-    let mut session = open(&args.port)?;
+    let mut session = args.on.open(None)?;
     let asks = std::io::stdin().is_terminal();
     let apply = |input: &[f32; 3]| {
         if asks {
-            let unit = match sensor {
-                Sensor::Gyro => "rad/s",
-                Sensor::Accel => "m/s²",
-            };
+            let unit = sensor.pick("rad/s", "m/s²");
             eprint!(
                 "apply {}, {}, {} {unit}, then press Enter: ",
                 input[0], input[1], input[2]
@@ -128,7 +117,7 @@ pub fn run_kalman(args: &KalmanArgs) -> Result<()> {
     let run = kalman(&mut session, &plan, apply, |share| bar.reach(share))?;
     bar.finish();
     let result = DeviceResult::new("kalman", session.port(), run);
-    print(&args.json, &report::kalman_text(&result), &result, None)
+    print(&args.on.json, &report::kalman_text(&result), &result, None)
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! `mimu device upload` and `mimu device download`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crate::report;
 use clap::Args;
@@ -12,8 +12,7 @@ use mimu_device::{
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::result_file::stage;
 
-use super::{PortArgs, open};
-use crate::arguments::JsonArgs;
+use super::OnDevice;
 use crate::output::{check_outputs, print, progress};
 use crate::overwriting::check_overwritten;
 
@@ -28,9 +27,7 @@ pub struct UploadArgs {
     #[arg(long)]
     force: bool,
     #[command(flatten)]
-    port: PortArgs,
-    #[command(flatten)]
-    json: JsonArgs,
+    on: OnDevice,
 }
 
 #[derive(Args)]
@@ -46,13 +43,10 @@ pub struct DownloadArgs {
     #[arg(long)]
     device: Option<String>,
     #[command(flatten)]
-    port: PortArgs,
-    #[command(flatten)]
-    json: JsonArgs,
+    on: OnDevice,
 }
 
 pub fn run_upload(args: &UploadArgs) -> Result<()> {
-    check_outputs(&[args.json.file()], &[&args.calibration])?;
     let place = args.calibration.display().to_string();
     let calibration = Calibration::read(&args.calibration)?;
     let judgement = calibration.judgement.as_ref();
@@ -61,7 +55,7 @@ pub fn run_upload(args: &UploadArgs) -> Result<()> {
         return Err(Error::new(place, problem, "calibrate the unit again").about(Argument::Force));
     }
     let image = Image::new(&calibration, &place)?;
-    let mut session = open(&args.port)?;
+    let mut session = args.on.open(Some(&args.calibration))?;
     if !args.other_unit {
         image.check_unit(session.who(), &place)?;
     }
@@ -74,18 +68,18 @@ pub fn run_upload(args: &UploadArgs) -> Result<()> {
     done.warnings
         .extend(outside_now(&mut session, &calibration)?);
     let result = DeviceResult::new("upload", session.port(), done);
-    print(&args.json, &report::upload_text(&result), &result, None)
+    print(&args.on.json, &report::upload_text(&result), &result, None)
 }
 
 pub fn run_download(args: &DownloadArgs) -> Result<()> {
     let outputs = [
         args.output.as_deref(),
         args.bytes.as_deref(),
-        args.json.file(),
+        args.on.json.file(),
     ];
-    check_outputs(&outputs, &[])?;
+    check_outputs(&outputs, None::<&Path>)?;
     check_overwritten(&outputs[..2])?;
-    let mut session = open(&args.port)?;
+    let mut session = args.on.open(None)?;
     let bytes = download(&mut session)?;
     let port = session.port();
     let mut contents = contents(&bytes).map_err(|refused| {
@@ -116,5 +110,10 @@ pub fn run_download(args: &DownloadArgs) -> Result<()> {
         files.push(stage(path, bytes.as_slice())?);
     }
     let result = DeviceResult::new("download", port, contents);
-    print(&args.json, &report::download_text(&result), &result, files)
+    print(
+        &args.on.json,
+        &report::download_text(&result),
+        &result,
+        files,
+    )
 }

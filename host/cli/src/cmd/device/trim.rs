@@ -8,9 +8,9 @@ use mimu_device::{DeviceResult, Pose, SHORTEST_TRIM_S, trim};
 use mimu_recording::error::{Error, Result};
 use nalgebra::Vector3;
 
-use super::{PortArgs, duration, open, side};
-use crate::arguments::{JsonArgs, number};
-use crate::output::{check_outputs, print, progress};
+use super::{OnDevice, duration, side};
+use crate::arguments::number;
+use crate::output::{print, progress};
 use crate::report;
 
 #[derive(Args)]
@@ -25,13 +25,10 @@ pub struct TrimArgs {
     #[arg(long = "for", value_name = "TIME", default_value = "20s", value_parser = duration)]
     duration: Duration,
     #[command(flatten)]
-    port: PortArgs,
-    #[command(flatten)]
-    json: JsonArgs,
+    on: OnDevice,
 }
 
 pub fn run_trim(args: &TrimArgs) -> Result<()> {
-    check_outputs(&[args.json.file()], &[])?;
     if args.duration.as_secs_f64() < SHORTEST_TRIM_S {
         return Err(Error::new(
             "--for",
@@ -49,12 +46,12 @@ pub fn run_trim(args: &TrimArgs) -> Result<()> {
             .map(|(up, gravity)| (up * gravity).into()),
     };
     let now_s = u64::try_from(Timestamp::now().as_second()).unwrap_or(0);
-    let mut session = open(&args.port)?;
+    let mut session = args.on.open(None)?;
     let bar = progress("trimming");
     let done = trim(&mut session, &pose, args.duration, now_s, |share| {
         bar.reach(share)
     });
     bar.finish();
     let result = DeviceResult::new("trim", session.port(), done?);
-    print(&args.json, &report::trim_text(&result), &result, None)
+    print(&args.on.json, &report::trim_text(&result), &result, None)
 }

@@ -2,16 +2,15 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
-use mimu::noise::noise_file::NoiseFile;
+use clap::Args;
 use mimu::plan::design::budget::DwellNoise;
-use mimu::quantity::Sensor;
 use mimu::signal::blocks::extent;
+use mimu::{NoiseFile, Sensor};
 use mimu_recording::error::Result;
 use mimu_thermal::basis::Shape;
 use mimu_thermal::plan::{Procedure, Request, plan, to_toml};
 
-use crate::arguments::{JsonArgs, number, range_c};
+use crate::arguments::{JsonArgs, choice, number, range_c};
 use crate::output::{Results, check_outputs};
 use crate::overwriting::check_overwritten;
 use crate::report;
@@ -19,8 +18,13 @@ use crate::report;
 #[derive(Args)]
 pub(super) struct PlanArgs {
     /// Sequence of temperatures and motions
-    #[arg(long, value_enum)]
-    procedure: ProcedureArg,
+    #[arg(long, value_parser = choice(&[
+        ("soak", "Set points; the unit soaks at each before it is measured (fang, 4.4)", Procedure::Soak),
+        ("niu", "Positions and quarter turns on a ramp up and down (niu, 3.2)", Procedure::Niu),
+        ("ramp", "Six faces and rates about all axes on a ramp up and down", Procedure::Ramp),
+        ("rest-ramp", "At rest with z up on a ramp up: biases only", Procedure::RestRamp),
+    ]))]
+    procedure: Procedure,
     /// Temperatures of the chamber, °C
     #[arg(long, value_name = "FROM..TO", default_value = "-10..70", allow_hyphen_values = true, value_parser = range_c)]
     range: [f64; 2],
@@ -28,8 +32,11 @@ pub(super) struct PlanArgs {
     #[arg(long, value_name = "C[:MIN],...", value_delimiter = ',', allow_hyphen_values = true, value_parser = held, conflicts_with_all = ["range", "soak"])]
     course: Vec<[f64; 2]>,
     /// Curves of all parameters over temperature, for the prediction
-    #[arg(long, value_enum, default_value = "cubic")]
-    curves: CurvesArg,
+    #[arg(long, default_value = "cubic", value_parser = choice(&[
+        ("line", "A straight line, from 10 K", Shape::Line),
+        ("cubic", "One cubic, from 20 K", Shape::Cubic),
+    ]))]
+    curves: Shape,
     /// Rate of the chamber, K/min
     #[arg(long, value_name = "K/MIN", default_value_t = 2.0, value_parser = |t: &str| number(t, 0.01, 30.0))]
     rate: f64,
@@ -61,26 +68,6 @@ pub(super) struct PlanArgs {
     json: JsonArgs,
 }
 
-#[derive(Clone, Copy, ValueEnum)]
-enum ProcedureArg {
-    /// Set points; the unit soaks at each before it is measured (fang, 4.4)
-    Soak,
-    /// Positions and quarter turns on a ramp up and down (niu, 3.2)
-    Niu,
-    /// Six faces and rates about all axes on a ramp up and down
-    Ramp,
-    /// At rest with z up on a ramp up: biases only
-    RestRamp,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum CurvesArg {
-    /// A straight line, from 10 K
-    Line,
-    /// One cubic, from 20 K
-    Cubic,
-}
-
 /// A temperature, °C, and the time that it is held, s.
 fn held(text: &str) -> std::result::Result<[f64; 2], String> {
     let (temp_c, min) = text.split_once(':').unwrap_or((text, "0"));
@@ -94,12 +81,7 @@ fn held(text: &str) -> std::result::Result<[f64; 2], String> {
 
 impl PlanArgs {
     fn request(&self) -> Result<Request> {
-        let procedure = match self.procedure {
-            ProcedureArg::Soak => Procedure::Soak,
-            ProcedureArg::Niu => Procedure::Niu,
-            ProcedureArg::Ramp => Procedure::Ramp,
-            ProcedureArg::RestRamp => Procedure::RestRamp,
-        };
+        let procedure = self.procedure;
         let noise = match &self.noise {
             None => Sensor::BOTH.map(DwellNoise::fang),
             Some(path) => {
@@ -124,10 +106,7 @@ impl PlanArgs {
                 [] => self.range,
                 course => extent(course.iter().map(|[temp_c, _]| *temp_c)),
             },
-            shape: match self.curves {
-                CurvesArg::Line => Shape::Line,
-                CurvesArg::Cubic => Shape::Cubic,
-            },
+            shape: self.curves,
             kelvin_per_min: self.rate,
             set_points: usize::from(self.points),
             both_ways: self.both_ways,
@@ -142,8 +121,7 @@ impl PlanArgs {
 }
 
 pub(super) fn run(args: &PlanArgs) -> Result<()> {
-    let stated: Vec<_> = args.noise.as_deref().into_iter().collect();
-    check_outputs(&[args.output.as_deref(), args.json.file()], &stated)?;
+    check_outputs(&[args.output.as_deref(), args.json.file()], &args.noise)?;
     check_overwritten(&[args.output.as_deref()])?;
     let planned = plan(&args.request()?)?;
     let mut out = Results::new(report::thermal_plan_text(&planned));

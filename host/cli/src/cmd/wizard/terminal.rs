@@ -103,7 +103,7 @@ fn end_in_time(stop: Arc<AtomicBool>, ends: Duration) -> Result<()> {
 }
 
 pub(crate) fn run(args: &WizardArgs, command_line: &str) -> Result<()> {
-    check_outputs(&[args.json.file()], &[])?;
+    check_outputs(&[args.json.file()], None::<&Path>)?;
     let config = args.config()?;
     let wanted = args.wanted()?;
     let driver: Box<dyn Driver> = match args.drivers.as_slice() {

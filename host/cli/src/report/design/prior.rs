@@ -2,10 +2,9 @@
 
 use maud::{Markup, html};
 use mimu::plan::design::fewest::{MOST, Widths};
-use mimu::quantity::{plural, significant};
-use mimu::readable;
 use mimu::result::design::Design;
 use mimu::result::design::beside_population::BesidePopulation;
+use mimu::{plural, readable, significant};
 
 use crate::report::page::Level;
 use crate::report::table::{number, table};

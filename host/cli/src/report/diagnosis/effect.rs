@@ -1,12 +1,11 @@
 //! An accepted effect: its influence on the error, its coefficients, and its alternatives.
 
 use maud::{Markup, html};
-use mimu::diagnose::decision::Accepted;
 use mimu::diagnose::picture::{Against, Panel, Picture};
 use mimu::effects::fitted::WrittenCoefficient;
-use mimu::quantity::{plus_minus, significant};
 use mimu::readable::{self, Readable};
 use mimu::result::diagnosis::{DiagnosisResult, SensorDiagnosisResult};
+use mimu::{Accepted, plus_minus, significant};
 
 use super::{by, chance, figure_of, figures};
 use crate::report::page::{Level, quantity};

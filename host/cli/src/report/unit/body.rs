@@ -1,9 +1,7 @@
 //! The further triads of a body: how they stand to their reference, and their matrices.
 
 use maud::{Markup, html};
-use mimu::calibration::Calibration;
-use mimu::calibration::body::BodyTriad;
-use mimu::quantity::AXES;
+use mimu::{AXES, BodyTriad, Calibration};
 use mimu_recording::{RawUnit, TriadKind};
 
 use crate::report::table::{interval, number, table, typed};

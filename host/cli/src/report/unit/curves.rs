@@ -2,10 +2,7 @@
 
 use maud::{Markup, html};
 use mimu::calibration::{Calibration, Curves, OverTemperature, TemperatureNode};
-use mimu::parameter::ParameterKind;
-use mimu::quantity::{AXES, Sensor};
-use mimu::readable;
-use mimu::triad::Forward;
+use mimu::{AXES, Forward, ParameterKind, Sensor, readable};
 
 use crate::report::page::{shown, spoken};
 use crate::report::thermal_plot::{changes, panel};

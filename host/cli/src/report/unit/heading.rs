@@ -3,8 +3,7 @@
 use std::path::Path;
 
 use maud::{Markup, html};
-use mimu_recording::error::{Error, Result};
-use mimu_recording::{check_kind, parse_toml, read_text};
+use mimu_recording::{Error, Result, check_kind, parse_toml, read_text};
 use serde::Deserialize;
 use toml::value::Datetime;
 

@@ -2,9 +2,8 @@
 
 use maud::{Markup, html};
 use mimu::calibration::{Calibration, TriadTable};
-use mimu::parameter::ParameterKind;
-use mimu::quantity::{AXES, Sensor};
 use mimu::readable::{self, Readable};
+use mimu::{AXES, ParameterKind, Sensor};
 use mimu_recording::RawUnit;
 
 use crate::report::fit::by_axis;

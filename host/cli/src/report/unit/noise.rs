@@ -2,8 +2,7 @@
 
 use maud::{Markup, html};
 use mimu::noise::noise_file::{NoiseChannel, NoiseFile};
-use mimu::quantity::Sensor;
-use mimu::readable;
+use mimu::{Sensor, readable};
 use mimu_allan::model::{FLOOR, Term};
 
 use crate::report::page::{shown, spoken};

@@ -1,11 +1,8 @@
 //! The poses of the dwells on a sphere, with their residuals.
 
 use maud::{Markup, html};
-use mimu::calibration::Calibration;
 use mimu::diagnose::picture::Picture;
-use mimu::prepared::Prepared;
-use mimu::quantity::Sensor;
-use mimu::signal::dwell::Dwell;
+use mimu::{Calibration, Dwell, Prepared, Sensor};
 use nalgebra::Vector3;
 
 use crate::report::svg::{Panel, px};

@@ -1,8 +1,7 @@
 //! The raw readings over time, with the dwells.
 
 use maud::{Markup, html};
-use mimu::prepared::Prepared;
-use mimu::quantity::{AXES, Sensor};
+use mimu::{AXES, Prepared, Sensor};
 
 use crate::report::page::spoken;
 use crate::report::svg::{AXIS_CLASSES, Chart, Panel, range};

@@ -7,8 +7,7 @@ use super::{
 };
 use crate::calibration::thermal_biases::ThermalBiases;
 use crate::quantity::Sensor;
-use mimu_recording::RawUnit;
-use mimu_recording::error::{Argument, Error, Result};
+use mimu_recording::{Argument, Error, RawUnit, Result};
 
 impl BiasCubics {
     /// The cubics of `sensor` over `range_c`, about `reference_c`; `None` if `biases` has no readings of it.
@@ -38,10 +37,7 @@ impl BiasCubics {
                     sensor.unit()
                 );
                 let remedy = "give the factor by which the autopilot's driver converts";
-                let argument = match sensor {
-                    Sensor::Gyro => Argument::GyroConversion,
-                    Sensor::Accel => Argument::AccelConversion,
-                };
+                let argument = sensor.pick(Argument::GyroConversion, Argument::AccelConversion);
                 return Err(Error::new(sensor, problem, remedy).about(argument));
             }
         };
@@ -56,10 +52,10 @@ impl BiasCubics {
         };
         let mut values: Vec<_> = temperatures(range_c).map(bias).collect();
         let mut cubics = Self::nearest(sensor, range_c, reference_c, conversion, &values);
-        let level = match sensor {
-            Sensor::Gyro => Vector3::zeros(),
-            Sensor::Accel => Vector3::from(cubics.coefficients.map(|c| c[0])),
-        };
+        let level = sensor.pick(
+            Vector3::zeros(),
+            Vector3::from(cubics.coefficients.map(|c| c[0])),
+        );
         values.iter_mut().for_each(|v| *v -= level);
         for (of_axis, level) in cubics.coefficients.iter_mut().zip(&level) {
             of_axis[0] -= level;
@@ -68,10 +64,10 @@ impl BiasCubics {
         let lag_s = biases.dies[sensor].lag_s;
         let late = cubics.late(&values, lag_s, |t| Ok(bias(t) - level))?;
         cubics.remains.push(late);
-        let of_gravity = match sensor {
-            Sensor::Gyro => "the unit only lay still",
-            Sensor::Accel => "and what they do to gravity at rest counts as bias",
-        };
+        let of_gravity = sensor.pick(
+            "the unit only lay still",
+            "and what they do to gravity at rest counts as bias",
+        );
         let never = "the unit only lay still";
         let gains = [
             ("scale factors and cross terms", never),

@@ -124,10 +124,7 @@ impl<'a> Part<'a> {
         rate: Vector3<f64>,
         force: Vector3<f64>,
     ) {
-        let input = match self.sensor {
-            Sensor::Gyro => rate,
-            Sensor::Accel => force,
-        };
+        let input = self.sensor.pick(rate, force);
         let prepared = self.session.prepared;
         self.block.push(at);
         self.conditions.push(Conditions {
@@ -157,10 +154,9 @@ impl<'a> Part<'a> {
         let force = self.force(index);
         // A table may know the input of the other sensor. But without that sensor no device could remove an effect that depends on it.
         let lacks_other = table
-            && match self.sensor {
-                Sensor::Gyro => self.session.accel.is_none(),
-                Sensor::Accel => self.session.gyro.is_none(),
-            };
+            && self
+                .sensor
+                .pick(self.session.accel.is_none(), self.session.gyro.is_none());
         let first = self.conditions.len();
         for at in prepared.dwells.list[index].blocks.clone() {
             let block = &prepared.condensed.blocks[at];

@@ -12,8 +12,7 @@ use crate::observation::{LOWER, free, of_output};
 use crate::parameter::ParameterKind;
 use crate::prior::Prior;
 use crate::quantity::Sensor;
-use mimu_recording::error::{Error, Result};
-use mimu_recording::{RawUnit, Reference};
+use mimu_recording::{Error, RawUnit, Reference, Result};
 
 /// The population of accelerometers by hand.
 #[derive(Debug, Clone, PartialEq)]

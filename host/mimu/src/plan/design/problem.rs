@@ -11,8 +11,7 @@ use super::reach::{Fixture, Rates, Reach};
 use super::refinement::{Region as _, refine};
 use crate::estimate::magnitude::FEWEST_WITH_PRIOR;
 use crate::quantity::{Sensor, plural};
-use mimu_recording::Reference;
-use mimu_recording::error::{Argument, Error, Result};
+use mimu_recording::{Argument, Error, Reference, Result};
 
 /// A model, and what it can be measured with.
 #[derive(Debug, Clone)]

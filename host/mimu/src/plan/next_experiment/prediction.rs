@@ -157,10 +157,7 @@ fn apart_from_bias(mut candidate: Candidate) -> Candidate {
             rate,
             force,
             angular_acceleration: Vector3::zeros(),
-            sensed: match candidate.sensor {
-                Sensor::Gyro => rate,
-                Sensor::Accel => force,
-            },
+            sensed: candidate.sensor.pick(rate, force),
             temperature_offset: 20.0 * even(0.316_625),
             lagged_temperature: 20.0 * even(0.872_983),
         };
@@ -211,10 +208,7 @@ struct Problem {
 /// The problems of a sensor. With a known input there is one for each axis, with its bias and its row of the matrix. If only the
 /// magnitude of gravity is known, the three axes of an accelerometer are one problem, and a gyro shows its biases at rest.
 fn problems(setup: &Setup, sensor: Sensor, states: &[Conditions]) -> Vec<Problem> {
-    let input = |at: &Conditions| match sensor {
-        Sensor::Gyro => at.rate,
-        Sensor::Accel => at.force,
-    };
+    let input = |at: &Conditions| sensor.pick(at.rate, at.force);
     let problem = |measured: Vec<Vector3<f64>>, parameters: &[usize]| {
         let mut affine = Vec::new();
         let each = states.iter().zip(&measured);

@@ -259,10 +259,7 @@ impl Experiment {
                 force,
                 angular_acceleration: Vector3::zeros(),
                 // For a perfect triad: the difference of a real one is of second order.
-                sensed: match sensor {
-                    Sensor::Gyro => rate,
-                    Sensor::Accel => force,
-                },
+                sensed: sensor.pick(rate, force),
                 temperature_offset: of(&self.board),
                 lagged_temperature: of(&late),
             }

@@ -7,31 +7,10 @@ use super::super::rotation::{Correction, Rotation, from_euler, listed, orientati
 /// Number of sensors of each kind whose calibration PX4 stores.
 const MOST_SENSORS: usize = 4;
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Sensor {
-    Gyro,
-    Accel,
-}
-
-impl Sensor {
-    pub const ALL: [Sensor; 2] = [Sensor::Gyro, Sensor::Accel];
-
-    /// Prefix of its parameters.
-    fn prefix(self) -> &'static str {
-        match self {
-            Sensor::Gyro => "CAL_GYRO",
-            Sensor::Accel => "CAL_ACC",
-        }
-    }
-
-    /// The parameter that enables its compensation over temperature.
-    fn thermal(self) -> &'static str {
-        match self {
-            Sensor::Gyro => "TC_G_ENABLE",
-            Sensor::Accel => "TC_A_ENABLE",
-        }
-    }
-}
+/// Prefixes of the parameters of gyros and of accelerometers.
+const PREFIXES: [&str; 2] = ["CAL_GYRO", "CAL_ACC"];
+/// The parameters that enable their compensation over temperature.
+const THERMAL: [&str; 2] = ["TC_G_ENABLE", "TC_A_ENABLE"];
 
 /// Parameters by name.
 type Values = BTreeMap<String, f64>;
@@ -78,9 +57,9 @@ impl Parameters {
     }
 
     /// Id of the calibrated sensor, if only one is calibrated.
-    pub fn only_id(&self, sensor: Sensor) -> Option<u32> {
+    pub fn only_id(&self, sensor: usize) -> Option<u32> {
         let (_, values) = self.epochs.last()?;
-        let id = |n: usize| values.get(&format!("{}{n}_ID", sensor.prefix())).copied();
+        let id = |n: usize| values.get(&format!("{}{n}_ID", PREFIXES[sensor])).copied();
         let mut ids = (0..MOST_SENSORS).filter_map(id).filter(|id| *id != 0.0);
         let only = ids.next()?;
         ids.next().is_none().then(|| device_id(only))
@@ -90,7 +69,7 @@ impl Parameters {
     /// earlier readings too. `mounted`: whether the readings are on the vehicle's axes instead of the board's.
     pub fn undo(
         &self,
-        sensor: Sensor,
+        sensor: usize,
         devices: &[(usize, u32)],
         readings: &[[f64; 3]],
         mounted: bool,
@@ -149,11 +128,11 @@ impl Parameters {
         if self
             .epochs
             .iter()
-            .any(|(_, values)| values.get(sensor.thermal()) == Some(&1.0))
+            .any(|(_, values)| values.get(THERMAL[sensor]) == Some(&1.0))
         {
             warnings.push(format!(
                 "PX4's compensation over temperature is on ({}) and is not undone",
-                sensor.thermal()
+                THERMAL[sensor]
             ));
         }
         Undone {
@@ -171,12 +150,12 @@ fn device_id(parameter: f64) -> u32 {
 
 /// PX4's calibration of the sensor with id `device`, and a description of it; or why it is unknown.
 fn correction(
-    sensor: Sensor,
+    sensor: usize,
     device: u32,
     values: &Values,
     mounted: bool,
 ) -> Result<(Correction, String), String> {
-    let prefix = sensor.prefix();
+    let prefix = PREFIXES[sensor];
     let is_own = |n: &usize| {
         values
             .get(&format!("{prefix}{n}_ID"))

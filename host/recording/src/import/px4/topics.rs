@@ -67,7 +67,7 @@ impl Topic {
 
     /// Takes a message of the topic; `None` if it lacks a field.
     pub fn take(&mut self, of: &TopicFields, data: &DataMessage<'_>) -> Option<()> {
-        if let Some(id) = u32_in(data, "device_id")
+        if let Some(id) = field(data, "device_id")
             && self.devices.last().is_none_or(|(_, before)| *before != id)
         {
             self.devices.push((self.values.len(), id));
@@ -75,8 +75,8 @@ impl Topic {
         if of.fields.is_empty() {
             return self.take_fifo(data);
         }
-        let sampled = u64_in(data, "timestamp_sample");
-        let stamp_ns = nanoseconds(sampled.or_else(|| u64_in(data, "timestamp"))?)?;
+        let sampled = field(data, "timestamp_sample");
+        let stamp_ns = nanoseconds(sampled.or_else(|| field(data, "timestamp"))?)?;
         let readings = of.fields.iter().map(|field| f32_in(data, field));
         let readings: Vec<f64> = readings.collect::<Option<_>>()?;
         let (gyro, accel) = readings.split_first_chunk()?;
@@ -91,7 +91,7 @@ impl Topic {
 
     /// Takes a batch of the sensor's FIFO; its last sample has the time of the message.
     fn take_fifo(&mut self, data: &DataMessage<'_>) -> Option<()> {
-        let last_ns = nanoseconds(u64_in(data, "timestamp_sample")?)?;
+        let last_ns = nanoseconds(field(data, "timestamp_sample")?)?;
         let (step_us, scale) = (f32_in(data, "dt")?, f32_in(data, "scale")?);
         let count = usize::from(field::<u8>(data, "samples")?);
         for i in 0..count {
@@ -107,18 +107,9 @@ impl Topic {
     }
 }
 
-fn field<T: ParseableFieldType>(data: &DataMessage<'_>, name: &str) -> Option<T> {
+pub(super) fn field<T: ParseableFieldType>(data: &DataMessage<'_>, name: &str) -> Option<T> {
     let parser = data.flattened_format.get_field_parser::<T>(name).ok()?;
     Some(parser.parse(data.data))
-}
-
-fn u64_in(data: &DataMessage<'_>, name: &str) -> Option<u64> {
-    field(data, name)
-}
-
-/// A whole number in field `name`, such as an id.
-pub(super) fn u32_in(data: &DataMessage<'_>, name: &str) -> Option<u32> {
-    field(data, name)
 }
 
 fn f32_in(data: &DataMessage<'_>, name: &str) -> Option<f64> {

@@ -167,7 +167,7 @@ impl Unit {
     /// The unit of `factor` seconds.
     pub fn of_factor(factor: f64) -> Unit {
         let same = |unit: &Decimal| (factor * unit.per_second() as f64 - 1.0).abs() < 1e-12;
-        let known = Decimal::ALL.into_iter().find(same);
+        let known = Decimal::all().find(same);
         known.map_or(Unit::Other(factor), Unit::Decimal)
     }
 
@@ -177,7 +177,7 @@ impl Unit {
         let epoch = |unit: &Decimal| {
             EPOCH_S.contains(&(seen.first / unit.per_second() as f64)) && rate(unit) > SLOWEST_HZ
         };
-        let mut epochs = Decimal::ALL.into_iter().filter(epoch);
+        let mut epochs = Decimal::all().filter(epoch);
         epochs.find(|unit| rate(unit) < RATES_HZ.end)
     }
 
@@ -192,13 +192,11 @@ impl Unit {
         let rate = |unit: &Decimal| unit.per_second() as f64 / seen.interval;
         if let Some(rate_hz) = seen.rate_hz {
             let off = |unit: &Decimal| (rate(unit) / rate_hz).ln().abs();
-            let nearest = Decimal::ALL
-                .into_iter()
-                .min_by(|a, b| off(a).total_cmp(&off(b)));
+            let nearest = Decimal::all().min_by(|a, b| off(a).total_cmp(&off(b)));
             return Ok(nearest.unwrap_or(Decimal::Second));
         }
         let possible = |unit: &Decimal| RATES_HZ.contains(&rate(unit));
-        let all: Vec<Decimal> = Decimal::ALL.into_iter().filter(possible).collect();
+        let all: Vec<Decimal> = Decimal::all().filter(possible).collect();
         let coarse_lasts_s = |unit: &Decimal| seen.lasts / unit.per_second() as f64;
         match all[..] {
             [unit] => Ok(unit),
