@@ -41,6 +41,35 @@ pub struct Flight {
     pub white: [f64; 2],
     /// Whether it rests for half of each `CYCLE_S`.
     pub rests: bool,
+    /// What the reference's frame is distorted by, alike in all of the flight: a point at `p` is seen at `p + strain p`.
+    pub strain: Matrix3<f64>,
+}
+
+/// Markers about their centre, m, on a plate that is mounted as the reference.
+const MARKERS: [[f64; 3]; 4] = [
+    [0.06, 0.04, 0.0],
+    [-0.06, 0.04, 0.0],
+    [-0.06, -0.04, 0.0],
+    [0.06, -0.04, 0.0],
+];
+
+/// The attitude that fits best to where the markers are seen (Wahba's problem, by Kabsch). A distorted plate seems turned, by an angle that depends on its attitude.
+fn seen(attitude: &Rotation3<f64>, strain: &Matrix3<f64>) -> Rotation3<f64> {
+    let each = MARKERS.map(|marker| {
+        let marker = Vector3::from(marker);
+        let at = attitude * marker;
+        (at + strain * at) * marker.transpose()
+    });
+    let svd = each.into_iter().sum::<Matrix3<f64>>().svd(true, true);
+    let (Some(u), Some(v_t)) = (svd.u, svd.v_t) else {
+        return *attitude;
+    };
+    let last = (u * v_t).determinant().signum();
+    // The markers of a plate have no extent across it: the least singular value is that of its normal.
+    let least = svd.singular_values.imin();
+    let mut signs = Vector3::repeat(1.0);
+    signs[least] = last;
+    Rotation3::from_matrix_unchecked(u * Matrix3::from_diagonal(&signs) * v_t)
 }
 
 /// A rest and a motion.
@@ -227,10 +256,14 @@ impl Flight {
             let mut noise = |size: f64| Vector3::from_fn(|_, _| size * random.normal());
             let [turned, moved] = self.reference.map(&mut noise);
             let attitude = curves.attitude(t);
-            let position = curves.position(t) + attitude * self.lever_m + moved;
-            let mounted = attitude
-                * Rotation3::from_scaled_axis(self.mounting)
-                * Rotation3::from_scaled_axis(turned);
+            let mut position = curves.position(t) + attitude * self.lever_m;
+            let mut mounted = attitude * Rotation3::from_scaled_axis(self.mounting);
+            if self.strain != Matrix3::zeros() {
+                position += self.strain * position;
+                mounted = seen(&mounted, &self.strain);
+            }
+            position += moved;
+            mounted *= Rotation3::from_scaled_axis(turned);
             let q = UnitQuaternion::from_rotation_matrix(&mounted);
             let _ = writeln!(
                 text,

@@ -26,8 +26,58 @@ pub(crate) fn undetermined(why: impl std::fmt::Display) -> Judgement {
 
 /// Of a gyro or accelerometer against `reference`; `signal`: rms of an axis of the reference, in `unit`.
 pub(crate) fn same_body(errors: &Errors, signal: f64, reference: &str, unit: &str) -> Judgement {
-    let (held, floor) = (errors.held_out_rms, errors.noise_floor);
-    let of = |x: f64| format!("{} {}", significant(x), unit.replace("^2", "²"));
+    let errors = [errors.held_out_rms, errors.noise_floor];
+    unseen(errors, signal, (reference, "pieces of time"), unit)
+}
+
+/// A judgement by the pieces of one recording, as far as these can show an error.
+pub(crate) fn of_one_recording(judgement: Judgement) -> Judgement {
+    match judgement.kind {
+        JudgementKind::Good => Judgement::new(
+            JudgementKind::Good,
+            format!(
+                "{}; judged on one recording only, which does not show what the instrument errs by in all of it",
+                judgement.reason
+            ),
+        ),
+        _ => judgement,
+    }
+}
+
+/// The same by recordings with their trajectories, each by the calibration of the others. `without`: the error without a calibration, and whether that is of readings in SI as they are.
+pub(crate) fn across(
+    errors: [f64; 2],
+    signal: f64,
+    (without, in_si): (f64, bool),
+    unit: &str,
+) -> Judgement {
+    let by_noise = unseen(errors, signal, ("the trajectory", "recordings"), unit);
+    if by_noise.kind != JudgementKind::Unexplained || errors[0] < without {
+        return by_noise;
+    }
+    let readings = match in_si {
+        true => "the readings as they are",
+        false => "one scale factor without angles",
+    };
+    misfit(format!(
+        "it errs by {} in recordings that the fit has not used, and {readings} by {}",
+        of_unit(errors[0], unit),
+        of_unit(without, unit)
+    ))
+}
+
+fn of_unit(x: f64, unit: &str) -> String {
+    format!("{} {}", significant(x), unit.replace("^2", "²"))
+}
+
+/// By the errors in `parts` that the fit has not used, and those by white noise.
+fn unseen(
+    [held, floor]: [f64; 2],
+    signal: f64,
+    (reference, parts): (&str, &str),
+    unit: &str,
+) -> Judgement {
+    let of = |x: f64| of_unit(x, unit);
     if held > MISFIT_SHARE * signal {
         return misfit(format!(
             "it does not read the motion of {reference}: it differs by {} of {}; check its columns and its unit, and that both are on one rigid body",
@@ -37,14 +87,14 @@ pub(crate) fn same_body(errors: &Errors, signal: f64, reference: &str, unit: &st
     }
     if held > BY_NOISE * floor {
         let reason = format!(
-            "it differs from {reference} by {} in pieces of time that the fit has not used, and white noise explains {}",
+            "it differs from {reference} by {} in {parts} that the fit has not used, and white noise explains {}",
             of(held),
             of(floor)
         );
         return Judgement::new(JudgementKind::Unexplained, reason);
     }
     let reason = format!(
-        "it differs from {reference} by {} in pieces of time that the fit has not used, as white noise explains ({})",
+        "it differs from {reference} by {} in {parts} that the fit has not used, as white noise explains ({})",
         of(held),
         of(floor)
     );

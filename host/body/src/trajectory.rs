@@ -5,6 +5,7 @@
 
 mod compared;
 mod poses;
+mod several;
 
 use mimu::calibration::of_fit::{FIGURE_DIGITS, triad_table};
 use mimu::calibration::{Calibration, Judged, TriadTable};
@@ -23,6 +24,8 @@ use crate::relation::{DELAY, Relation};
 use crate::result::EstimateResult;
 use crate::series::Series;
 use crate::{Body, TriadVerification, arm_of, judge};
+pub use several::{ByTrajectories, HeldOut, TrajectoriesResult};
+
 use compared::{ARM, CLOCK, Compared, TILT, TURN_S, Up};
 use poses::Poses;
 
@@ -142,28 +145,44 @@ impl Turns {
     }
 }
 
-impl ByTrajectory {
-    /// The calibration of a recording's gyro and accelerometer by `trajectory`, whose times are of the recording's clock within 30 s.
-    ///
-    /// # Errors
-    /// The samples cannot be read; there is no gyro; the trajectory is not of this motion, or turns too little.
-    pub fn of(recording: &Recording, trajectory: &Trajectory) -> Result<Self> {
+/// A recording beside the poses of its trajectory.
+struct Beside<'a> {
+    recording: &'a Recording,
+    /// The file of the trajectory.
+    place: &'a str,
+    gyro: Series,
+    accel: Option<Series>,
+    turns: Turns,
+}
+
+impl<'a> Beside<'a> {
+    fn read(recording: &'a Recording, trajectory: &'a Trajectory) -> Result<Self> {
         let gyro = read_first(recording, Sensor::Gyro)?.ok_or_else(|| {
             let remedy = "a trajectory is found in time by the rates: record the gyro too";
             Error::new(&recording.place, "there is no gyro", remedy)
         })?;
-        let turns = Turns::of(trajectory, &gyro)?;
-        let compared = Compared::new(&gyro, &turns.poses, None, turns.later_s);
+        Ok(Self {
+            recording,
+            place: &trajectory.place,
+            turns: Turns::of(trajectory, &gyro)?,
+            gyro,
+            accel: read_first(recording, Sensor::Accel)?,
+        })
+    }
+
+    fn fitted(&self) -> Result<ByTrajectory> {
+        let turns = &self.turns;
+        let compared = Compared::new(&self.gyro, &turns.poses, None, turns.later_s);
         let found = compared.and_then(|c| Some((c.solved(turns.start.clone())?, c.signal())));
         let ((found, noise), signal) = found.ok_or_else(|| {
             let problem = "the body turns too little for a gyro's scale factors";
             Error::new(
-                &trajectory.place,
+                self.place,
                 problem,
                 "turn it about all three axes, by half a turn and more",
             )
         })?;
-        let mut all = Self {
+        let mut all = ByTrajectory {
             body: Body {
                 triads: Vec::new(),
                 refused: Vec::new(),
@@ -175,7 +194,10 @@ impl ByTrajectory {
             attitude_noise_deg: noise.to_degrees(),
             position_noise_mm: None,
         };
-        all.accelerometer(recording, &turns.poses, &found)?;
+        if let Some(raw) = &self.accel {
+            let gravity = self.recording.manifest.gravity_mps2;
+            all.accelerometer(raw, gravity, &turns.poses, &found);
+        }
         match fitted(Sensor::Gyro, &found, signal) {
             Some(mut gyro) => {
                 if let Some(accel) = all.body.triads.first()
@@ -194,24 +216,55 @@ impl ByTrajectory {
         Ok(all)
     }
 
-    /// Adds the accelerometer.
-    fn accelerometer(
-        &mut self,
-        recording: &Recording,
-        poses: &Poses,
-        gyro: &Relation,
-    ) -> Result<()> {
-        let Some(raw) = read_first(recording, Sensor::Accel)? else {
-            return Ok(());
+    /// What these calibrations err by, and the signal, if the axis that points `up` is known or not: the scale factors and the angles between the axes are theirs; where the instrument sees the body, clock, tilt and biases are found anew.
+    fn judged(
+        &self,
+        models: &PerSensor<Option<Affine<f64>>>,
+        up: Option<&str>,
+    ) -> PerSensor<Option<(TriadVerification, f64)>> {
+        let mut all = PerSensor::from_fn(|_| None);
+        let turns = &self.turns;
+        let by_turns = models.gyro.and_then(|own| {
+            let compared = Compared::new(&self.gyro, &turns.poses, None, turns.later_s)?;
+            judged(compared, &turns.start, &own)
+        });
+        let Some((by_turns, signal)) = by_turns else {
+            return all;
         };
+        all.gyro = Some((verification(&by_turns, signal, Sensor::Gyro), signal));
+        if turns.poses.position.is_some()
+            && let Some((raw, own)) = self.accel.as_ref().zip(models.accel)
+        {
+            let gravity = self.recording.manifest.gravity_mps2;
+            let beside = upright(raw, &turns.poses, (gravity, up), &by_turns);
+            let found = beside.and_then(|(_, compared, start)| judged(compared, &start, &own));
+            all.accel = found.map(|(found, signal)| {
+                let errors = verification(&found, signal, Sensor::Accel);
+                (errors, signal)
+            });
+        }
+        all
+    }
+}
+
+impl ByTrajectory {
+    /// The calibration of a recording's gyro and accelerometer by `trajectory`, whose times are of the recording's clock within 30 s.
+    ///
+    /// # Errors
+    /// The samples cannot be read; there is no gyro; the trajectory is not of this motion, or turns too little.
+    pub fn of(recording: &Recording, trajectory: &Trajectory) -> Result<Self> {
+        Beside::read(recording, trajectory)?.fitted()
+    }
+
+    /// Adds the accelerometer.
+    fn accelerometer(&mut self, raw: &Series, gravity: f64, poses: &Poses, gyro: &Relation) {
         let name = first(Sensor::Accel);
         if poses.position.is_none() {
             let why = "the trajectory has attitudes alone, and an accelerometer is compared with its positions";
             self.body.refused.push((name, judge::undetermined(why)));
-            return Ok(());
+            return;
         }
-        let gravity = recording.manifest.gravity_mps2;
-        let found = upright(&raw, poses, gravity, gyro).and_then(|(up, compared, start)| {
+        let found = upright(raw, poses, (gravity, None), gyro).and_then(|(up, compared, start)| {
             let (relation, noise) = compared.solved(start)?;
             let mut triad = fitted(Sensor::Accel, &relation, compared.signal())?;
             triad.lever_arm_mm = arm_of(&relation, ARM);
@@ -220,49 +273,40 @@ impl ByTrajectory {
         let Some((up, relation, noise, triad)) = found else {
             let why = "its scale factors and angles are not determined: bring each axis up, down and in between";
             self.body.refused.push((name, judge::undetermined(why)));
-            return Ok(());
+            return;
         };
         self.up = Some(up);
         self.position_noise_mm = Some(1e3 * noise);
         self.tilt_deg = Some([TILT, TILT + 1].map(|k| relation.estimate(k, 1f64.to_degrees())));
         self.body.triads.push(triad);
-        Ok(())
     }
+}
 
-    /// The tables of a calibration file.
-    pub fn tables(&self, raw: RawUnit) -> PerSensor<Option<TriadTable>> {
-        let has_accel = self
-            .body
-            .triads
-            .iter()
-            .any(|of| of.name == first(Sensor::Accel));
-        PerSensor::from_fn(|sensor| {
-            let of = self
-                .body
-                .triads
-                .iter()
-                .find(|of| of.name == first(sensor))?;
-            let frame = match has_accel {
-                true => "body: x along the accelerometer's x, xy plane through its y",
-                false => "body: x along the gyro's x, xy plane through its y",
-            };
-            let figure = |x: f64| rounded(x, FIGURE_DIGITS);
-            let judged = Judged {
-                estimator: "trajectory".into(),
-                figure: match sensor {
-                    Sensor::Gyro => "mean rate of turns of a second".into(),
-                    Sensor::Accel => "mean specific force over half a second".into(),
-                },
-                unit: of.unit.into(),
-                rms: figure(of.rms),
-                held_out_rms: Some(figure(of.held_out_rms)),
-                noise_floor: Some(figure(of.noise_floor)),
-                dwells: of.windows,
-                condition: condition(&of.triad.inverse_covariance),
-            };
-            Some(triad_table(&of.triad, sensor, raw, frame, judged))
-        })
-    }
+/// The tables of gyro and accelerometer in a calibration file.
+pub fn tables(body: &Body, raw: RawUnit) -> PerSensor<Option<TriadTable>> {
+    let has_accel = body.triads.iter().any(|of| of.name == first(Sensor::Accel));
+    PerSensor::from_fn(|sensor| {
+        let of = body.triads.iter().find(|of| of.name == first(sensor))?;
+        let frame = match has_accel {
+            true => "body: x along the accelerometer's x, xy plane through its y",
+            false => "body: x along the gyro's x, xy plane through its y",
+        };
+        let figure = |x: f64| rounded(x, FIGURE_DIGITS);
+        let judged = Judged {
+            estimator: "trajectory".into(),
+            figure: match sensor {
+                Sensor::Gyro => "mean rate of turns of a second".into(),
+                Sensor::Accel => "mean specific force over half a second".into(),
+            },
+            unit: of.unit.into(),
+            rms: figure(of.rms),
+            held_out_rms: Some(figure(of.held_out_rms)),
+            noise_floor: Some(figure(of.noise_floor)),
+            dwells: of.windows,
+            condition: condition(&of.triad.inverse_covariance),
+        };
+        Some(triad_table(&of.triad, sensor, raw, frame, judged))
+    })
 }
 
 /// How well the motion determines all parameters: ratio of the largest to the smallest axis of the ellipsoid of their errors, each in its standard deviation.
@@ -281,6 +325,7 @@ fn fitted(sensor: Sensor, relation: &Relation, signal: f64) -> Option<FittedTria
     };
     let unit = sensor.unit();
     let judgement = judge::same_body(&relation.errors, signal, "the trajectory", unit);
+    let judgement = judge::of_one_recording(judgement);
     let parts = (relation, Vec::new());
     let of = FittedTriad::of(first(sensor), parts, (unit, window_s), judgement)?;
     Some(FittedTriad {
@@ -289,14 +334,15 @@ fn fitted(sensor: Sensor, relation: &Relation, signal: f64) -> Option<FittedTria
     })
 }
 
-/// An accelerometer beside the poses with the axis that points up, by which it fits best, and its first parameters.
+/// An accelerometer beside the poses with the axis that points up, the one that is known or else by which it fits best, and its first parameters.
 fn upright<'a>(
     raw: &'a Series,
     poses: &'a Poses,
-    gravity: f64,
+    (gravity, known): (f64, Option<&str>),
     gyro: &Relation,
 ) -> Option<(&'static str, Compared<'a>, DVector<f64>)> {
-    let begun = UPS.iter().filter_map(|(up, axis, sign)| {
+    let asked = UPS.iter().filter(|of| known.is_none_or(|up| of.0 == up));
+    let begun = asked.filter_map(|(up, axis, sign)| {
         let up_by = Up::axis(*axis, *sign, gravity);
         let compared = Compared::new(raw, poses, Some(up_by), gyro.at[DELAY])?;
         let (start, squares) = compared.start_of_forces(gyro.at[CLOCK])?;
@@ -341,31 +387,9 @@ pub fn verify(
     trajectory: &Trajectory,
     calibration: &Calibration,
 ) -> Result<PerSensor<Option<TriadVerification>>> {
-    let gyro = read_first(recording, Sensor::Gyro)?.ok_or_else(|| {
-        let remedy = "a trajectory is found in time by the rates: record the gyro too";
-        Error::new(&recording.place, "there is no gyro", remedy)
-    })?;
-    let turns = Turns::of(trajectory, &gyro)?;
-    let mut all = PerSensor::from_fn(|_| None);
-    let by_turns = calibration.inverse(Sensor::Gyro).and_then(|own| {
-        let compared = Compared::new(&gyro, &turns.poses, None, turns.later_s)?;
-        judged(compared, &turns.start, &own)
-    });
-    let Some((by_turns, signal)) = by_turns else {
-        return Ok(all);
-    };
-    all.gyro = Some(verification(&by_turns, signal, Sensor::Gyro));
-    let accel = match &turns.poses.position {
-        Some(_) => read_first(recording, Sensor::Accel)?,
-        None => None,
-    };
-    if let Some((raw, own)) = accel.zip(calibration.inverse(Sensor::Accel)) {
-        let gravity = recording.manifest.gravity_mps2;
-        let beside = upright(&raw, &turns.poses, gravity, &by_turns);
-        let found = beside.and_then(|(_, compared, start)| judged(compared, &start, &own));
-        all.accel = found.map(|(found, signal)| verification(&found, signal, Sensor::Accel));
-    }
-    Ok(all)
+    let models = PerSensor::from_fn(|sensor| calibration.inverse(sensor));
+    let judged = Beside::read(recording, trajectory)?.judged(&models, None);
+    Ok(judged.map(|of| Some(of?.0)))
 }
 
 /// The relation of a calibration that is judged to the poses, and the signal.

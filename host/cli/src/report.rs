@@ -58,7 +58,7 @@ pub(crate) use refusal::{print_refusal, refused};
 pub use sessions::sessions_text;
 pub use thermal::{thermal_page, thermal_text};
 pub use thermal_plan::thermal_plan_text;
-pub(crate) use trajectory::trajectory_text;
+pub(crate) use trajectory::{trajectories_text, trajectory_text};
 pub use unit::{Particulars, UnitReport, trace_figure, unit_page};
 pub use verify::verify_text;
 pub use wizard::{wizard_lines, wizard_text};

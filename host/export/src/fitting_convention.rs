@@ -1,13 +1,13 @@
 //! Which convention of a file fits a recording of its unit.
 //!
 //! Programs, and versions of one, differ in the direction of a matrix, in signs, units and the order of axes, and people copy numbers from one to another. Each
-//! reading of the file's numbers becomes a calibration, which [`verify`] judges by the recording. A reading other than the format's own counts only if the
-//! format's errs significantly more ([`SensorVerification::exceeds`]). If several fit alike, the simplest is taken, and the others are named.
+//! reading of the file's numbers becomes a calibration, whose errors the recording shows ([`TriadErrors`]). A reading other than the format's own counts only if the
+//! format's errs significantly more ([`TriadErrors::exceeds`]). If several fit alike, the simplest is taken, and the others are named.
 
 use std::ops::RangeInclusive;
 
 use mimu::calibration::Calibration;
-use mimu::calibration::verify::{SensorVerification, verify};
+use mimu::calibration::verify::TriadErrors;
 use mimu::judge::errors::UNEXPLAINED_SHARE;
 use mimu::known_size;
 use mimu::prepared::Prepared;
@@ -123,8 +123,7 @@ pub fn calibration(foreign: &Foreign, prepared: &Prepared) -> Result<(Calibratio
             let mut models = models;
             models[sensor] = Some(*model);
             let calibration = foreign.with(&models, raw_unit).ok()?;
-            let found = verify(prepared, &calibration).ok()?;
-            found.sensors[sensor].clone()
+            TriadErrors::of(prepared, &calibration, sensor)
         };
         let mut candidates = Vec::new();
         let mut gravity = None;
@@ -187,7 +186,7 @@ pub fn calibration(foreign: &Foreign, prepared: &Prepared) -> Result<(Calibratio
             bias_of_recording: !with_bias,
             rms_as_declared: declared.map(|c| c.2.rms),
             rms: found.rms,
-            unit: found.unit,
+            unit: found.figure.unit(sensor),
             file_noise: file.map(|file| file.into_iter().fold(0.0, f64::max)),
             noise,
             readable: found.figure.readable(sensor),
@@ -197,7 +196,7 @@ pub fn calibration(foreign: &Foreign, prepared: &Prepared) -> Result<(Calibratio
 }
 
 /// A reading: what it changes, its calibration, and how this is judged.
-type Candidate = (String, Affine<f64>, SensorVerification);
+type Candidate = (String, Affine<f64>, TriadErrors);
 
 /// What the best reading has least of: the error, and that at rest, where a bias shows, over the gain.
 fn merit((_, model, found): &Candidate) -> f64 {

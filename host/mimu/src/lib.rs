@@ -86,7 +86,8 @@ pub mod noise;
 pub mod observable;
 #[doc(hidden)]
 pub mod observation;
-mod one_unit;
+#[doc(hidden)]
+pub mod one_unit;
 #[doc(hidden)]
 pub mod parameter;
 #[doc(hidden)]

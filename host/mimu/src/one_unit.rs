@@ -3,9 +3,10 @@
 use mimu_recording::{Error, Manifest, Result, are_two_units};
 
 /// A key of a manifest, and its value as a person reads it.
-pub(crate) type Setting = (&'static str, fn(&Manifest) -> String);
+pub type Setting = (&'static str, fn(&Manifest) -> String);
 
-pub(crate) const RAW_UNIT: Setting = ("raw_unit", |m| m.raw_unit.to_string());
+/// The unit of the readings.
+pub const RAW_UNIT: Setting = ("raw_unit", |m| m.raw_unit.to_string());
 pub(crate) const REFERENCE: Setting = ("reference", |m| m.reference.to_string());
 pub(crate) const SAMPLE_RATE: Setting = ("sample_rate_hz", |m| m.sample_rate_hz.to_string());
 
@@ -22,7 +23,10 @@ pub(crate) fn are_others(
 
 /// Refuses recordings, each with its place, of which two belong to two units or differ in one of the `settings`. An unnamed device is like any other, and
 /// only a second named one shows that there are two.
-pub(crate) fn refuse_unlike(all: &[(&str, &Manifest)], settings: &[Setting]) -> Result<()> {
+///
+/// # Errors
+/// Such recordings.
+pub fn refuse_unlike(all: &[(&str, &Manifest)], settings: &[Setting]) -> Result<()> {
     const DEVICE: Setting = ("device", |m| format!("{:?}", m.device));
     for (k, (first, ours)) in all.iter().enumerate() {
         for (place, theirs) in &all[k + 1..] {

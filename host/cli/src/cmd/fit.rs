@@ -128,8 +128,9 @@ pub(crate) fn run(args: &FitArgs) -> Result<Status> {
             "leave --prior out: several sessions determine a unit without it",
         ));
     }
-    if let Some(by) = args.trajectory.read()? {
-        return beside(args, &by);
+    let by = args.trajectory.read_all(args.recordings.len())?;
+    if !by.is_empty() {
+        return beside(args, by);
     }
     match (&args.recordings[..], args.class) {
         ([recording], None) => one(args, recording),
@@ -444,31 +445,27 @@ fn one(args: &FitArgs, recording: &Path) -> Result<Status> {
     write(args, text, &all, &result.judgement, &place, made)
 }
 
-/// A recording beside a trajectory.
-fn beside(args: &FitArgs, by: &Trajectory) -> Result<Status> {
-    let [recording] = &args.recordings[..] else {
-        let remedy =
-            "fit one recording with its trajectory, and verify the calibration with the others";
-        return Err(Error::new(
-            &by.place,
-            "a trajectory is of one recording, and several are given",
-            remedy,
-        ));
-    };
-    let recording = open(recording, &args.log)?;
-    let manifest = recording.directory.join(MANIFEST_FILE);
-    let mut inputs: Vec<&Path> = vec![&manifest, &recording.samples];
-    inputs.extend(args.trajectory.trajectory.as_deref());
+/// Recordings beside their trajectories.
+fn beside(args: &FitArgs, by: Vec<Trajectory>) -> Result<Status> {
+    let each = args.recordings.iter().zip(by);
+    let each = each.map(|(recording, by)| Ok((open(recording, &args.log)?, by)));
+    let all: Vec<(Recording, Trajectory)> = each.collect::<Result<_>>()?;
+    let manifests = all.iter().map(|(of, _)| of.directory.join(MANIFEST_FILE));
+    let manifests: Vec<PathBuf> = manifests.collect();
+    let samples = all.iter().map(|(recording, _)| &recording.samples);
+    let inputs = manifests.iter().chain(samples);
+    let inputs = inputs.chain(&args.trajectory.trajectory);
+    let inputs: Vec<&Path> = inputs.map(PathBuf::as_path).collect();
     check_outputs(&[args.output.as_deref(), args.json.file()], &inputs)?;
-    let made = trajectory::fitted(&recording, by)?;
-    let calibration = || made.calibration(&recording);
+    let made = trajectory::fitted(&all, args.verbose.verbose)?;
+    let first = &all[0].0;
     write(
         args,
         made.text.clone(),
         &made.json,
         &made.judgement,
-        &recording.place,
-        calibration,
+        &first.place,
+        || made.calibration(first),
     )
 }
 

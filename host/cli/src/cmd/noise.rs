@@ -59,7 +59,7 @@ pub(crate) fn run(args: &NoiseInUseArgs) -> Result<Status> {
     let manifest = recording.directory.join(MANIFEST_FILE);
     let mut inputs: Vec<&Path> = vec![&manifest, &recording.samples, &args.recording, &args.noise];
     inputs.extend(args.calibration.as_deref());
-    inputs.extend(args.trajectory.trajectory.as_deref());
+    inputs.extend(args.trajectory.trajectory.iter().map(PathBuf::as_path));
     check_outputs(&[args.output.as_deref(), args.json.file()], &inputs)?;
     check_overwritten(&[args.output.as_deref()])?;
     let bar = progress("dead reckoning");

@@ -13,7 +13,7 @@ use mimu_rig::plan::Plan;
 use mimu_rig::rig_file::{RigFile, RigTruth};
 use serde_json::Value;
 
-use super::command::{done, json, mimu, says};
+use super::command::{all_refused, done, json, mimu, says};
 
 const PLAN: &str = "format = \"mimu-plan/1\"\ndevice = \"board\"\nsample_rate_hz = 100.0\ncarrier = \"hands\"\n\
     gravity_mps2 = 9.80665\nlead_in_s = 8.0\n[[step]]\nposes = 24\ndwell_s = 3.0\n";
@@ -175,4 +175,25 @@ fn a_log_without_rests_is_read_once() {
         assert_eq!(read, 1, "{}", ran.stderr);
         assert!(!ran.stderr.contains("exists"), "{}", ran.stderr);
     }
+}
+
+#[test]
+fn each_recording_needs_its_own_trajectory() {
+    let folder = tempfile::tempdir().unwrap();
+    let three = "a.csv b.csv c.csv --trajectory p.csv --trajectory q.csv --trajectory r.csv";
+    let times = format!("{three} --trajectory-zero 1 --trajectory-zero 2");
+    let cases = [
+        (
+            "a.csv b.csv --trajectory p.csv",
+            1,
+            "1 file for 2 recordings",
+        ),
+        (
+            "a.csv --trajectory p.csv --trajectory q.csv",
+            1,
+            "2 files for 1 recording",
+        ),
+        (&times, 1, "2 times for 3 files"),
+    ];
+    all_refused(folder.path(), "fit", &cases);
 }

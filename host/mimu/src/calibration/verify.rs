@@ -3,10 +3,12 @@
 mod causes;
 mod judged;
 mod power_ons;
+mod search;
 mod whole_turns;
 
 pub use causes::{Causes, Share};
 pub use power_ons::BiasMoved;
+pub use search::TriadErrors;
 pub use whole_turns::WholeTurnsOfAxis;
 
 use std::borrow::Cow;
@@ -78,17 +80,6 @@ pub struct SensorVerification {
     /// The biases of other power-ons within the recording, which are in this figure alone; absent without any.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub bias_moved: Vec<BiasMoved>,
-}
-
-impl SensorVerification {
-    /// Whether a figure of it significantly exceeds that of `other`, which the same data judge. `gain`: the output of its calibration over that of the other. At
-    /// rest errors are proportional to the output, so that they are compared at one gain.
-    pub fn exceeds(&self, other: &Self, gain: f64) -> bool {
-        let at_rest = self.static_rms.zip(other.static_rms);
-        exceeds(self.rms, other.rms, self.figure, self.count)
-            || at_rest
-                .is_some_and(|(own, other)| exceeds(own, gain * other, Figure::Input, self.count))
-    }
 }
 
 /// Result of verifying a calibration by a recording: `mimu-verify/1`.
@@ -417,12 +408,7 @@ fn judge(
     sensor: Sensor,
     (power_on, taken): (PowerOn, &Taken),
 ) -> Option<(SensorVerification, Vec<Warning>)> {
-    let mut models = PerSensor::from_fn(|s| calibration.inverse(s));
-    models[sensor]?;
-    // Whole turns judge a gyro by the accelerometer's readings as delivered, too.
-    let delivered = || prepared.whole_turns().map(|_| Affine::identity());
-    models.accel = models.accel.or_else(delivered);
-    let judging = Judging::of(prepared, sensor, &models)?;
+    let (judging, models) = judging(prepared, calibration, sensor)?;
     let judged = figures(prepared, &judging, &models)?;
     let causes = causes::of(prepared, &judging, calibration);
     let announced = |of| causes::announced(prepared, &judging, calibration, of);
@@ -440,6 +426,20 @@ fn judge(
         ..judged
     };
     Some((judged, judging.refused))
+}
+
+/// What judges `sensor`, and the models that its errors are by.
+fn judging<'a>(
+    prepared: &'a Prepared,
+    calibration: &Calibration,
+    sensor: Sensor,
+) -> Option<(Judging<'a>, Models)> {
+    let mut models = PerSensor::from_fn(|s| calibration.inverse(s));
+    models[sensor]?;
+    // Whole turns judge a gyro by the accelerometer's readings as delivered, too.
+    let delivered = || prepared.whole_turns().map(|_| Affine::identity());
+    models.accel = models.accel.or_else(delivered);
+    Some((Judging::of(prepared, sensor, &models)?, models))
 }
 
 /// The calibration of a unit whose sensors are all alike and perfectly mounted: every sensor with the mean scale factor
