@@ -173,6 +173,43 @@ def test_a_session_with_whole_turns_counts_them_and_says_what_one_is_read_as(usb
         assert calibration["gyro"]["interval_C"][i][i] < 1e-3 * abs(calibration["gyro"]["C"][i][i])
 
 
+# A phone lies beside the board for twelve seconds, when the session has had most of its poses.
+FIELD = """[field]
+size_ut = 50.0
+dip_deg = 65.0
+[[field.magnet]]
+at_m = [0.25, 0.0, 0.05]
+moment_am2 = [3.0, 0.0, 0.0]
+from_s = 100.0
+to_s = 112.0
+"""
+
+
+def test_a_magnetometer_is_calibrated_and_the_page_says_where_the_field_differs(usb, tmp_path):
+    spoken = web_board.lines(tmp_path, field=FIELD)
+    connect(usb, spoken)
+    shown = usb.eval_on_selector_all("#line-columns select", "all => all.map(select => select.value)")
+    assert ",".join(shown) == web_board.COLUMNS + ",mx,my,mz"
+    usb.fill("#board-field", "50")
+    begin(usb, 1000)
+    usb.locator("#field-off", has_text="here than in the poses before").wait_for(timeout=100_000)
+    if shots := os.environ.get("MIMU_SHOTS"):
+        usb.screenshot(path=f"{shots}/field.png", full_page=True)
+    usb.evaluate("board.perSecond = 4000")
+    finished(usb)
+    said = usb.inner_text("#log")
+    assert "here than in the poses before: move away from the desk" in said, said
+    assert "mag is judged" in said, said
+    if shots:
+        usb.screenshot(path=f"{shots}/mag.png", full_page=True)
+    ours = journal(usb, tmp_path / "page")
+    calibration = tomllib.loads((ours / "calibration.toml").read_text())
+    web_board.assert_true(calibration)
+    [mag] = calibration["body"]
+    assert (mag["triad"], mag["unit"]) == ("mag", "uT")
+    assert "mag" in json.loads(taken_away(usb, "fit.json"))["sensors"]
+
+
 def test_a_session_that_is_unplugged_goes_on_and_the_command_ends_it(usb, lines, tmp_path):
     connect(usb, lines)
     begin(usb, 1000)

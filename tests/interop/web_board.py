@@ -75,9 +75,10 @@ def spins(axes, turns=10):
     return steps
 
 
-def lines(folder, whole_turns=False):
+def lines(folder, whole_turns=False, field=None):
     """The lines of the board, some lost and some truncated. Its poses are those that a session asks for, repeated; with `whole_turns` they are
-    followed by ten turns each way about each axis, and those of the verification by turns about z."""
+    followed by ten turns each way about each axis, and those of the verification by turns about z. With a `field`, in the words of the rig, the board
+    has a magnetometer."""
     rest = [f"{10_000 * k},700,-400,17400,120,-210,{64 + k % 3}\r\n" for k in range(3000)]
     board = Socket(rest)
     wizard(board.port, folder / "plan", until=lambda _: (folder / "plan" / "session.json").exists())
@@ -94,15 +95,17 @@ def lines(folder, whole_turns=False):
     rig += f"[unit.gyro_axes]\n{still}[unit.accel_axes]\n{still}"
     for sensor, (matrix, bias) in {"gyro": GYRO, "accel": ACCEL}.items():
         rig += f"[unit.{sensor}_affine]\nmatrix = {matrix.tolist()}\nbias = {bias.tolist()}\n"
-    (folder / "rig.toml").write_text(rig + "[thermal]\non_before_s = inf\n")
+    mag = f'[[triad]]\nname = "mag"\nrotation_deg = [1.0, -2.0, 90.0]\n{field}' if field else ""
+    (folder / "rig.toml").write_text(rig + "[thermal]\non_before_s = inf\n" + mag)
     bench = pathlib.Path(os.environ["MIMU"]).parent / "mimu-rig"
     command = [bench, "record", "plan.toml", "--rig", "rig.toml", "--seed", "3", "-o", "truth", "--format", "csv"]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
-    written = ["MPU6050 OK\r\n", "t,ax,ay,az,gx,gy,gz\r\n"]
+    written = ["MPU6050 OK\r\n", "t,ax,ay,az,gx,gy,gz" + (",mx,my,mz" if field else "") + "\r\n"]
+    sensors = ["accel", "gyro", "mag"][: 3 if field else 2]
     with open(folder / "truth" / "samples.csv", newline="") as file:
         for k, row in enumerate(csv.DictReader(file)):
-            codes = [round(float(row[f"{sensor}_{axis}"])) for sensor in ["accel", "gyro"] for axis in "xyz"]
+            codes = [round(float(row[f"{sensor}_{axis}"])) for sensor in sensors for axis in "xyz"]
             line = ",".join(map(str, [700_000 + 10_000 * k, *codes])) + "\r\n"
             # Only a few: a turn with a missing sample cannot be integrated.
             if k % 7001 == 500:

@@ -11,13 +11,13 @@ import * as session from "./session.js";
 /** Field that sets an argument of `mimu wizard`. */
 const FIELDS = {
   "--gravity": "board-gravity", "--latitude": "board-latitude", "--baud": "baud", "--text": "line-columns", "--raw-unit": "board-unit",
-  "--device": "board-name", "--fixture": "board-fixture", "--dwell": "board-dwell", "--whole-turns": "board-turns",
+  "--field": "board-field", "--device": "board-name", "--fixture": "board-fixture", "--dwell": "board-dwell", "--whole-turns": "board-turns",
 };
 
 /** Roles of the numbers in a line, as in `--text`. */
 const COLUMNS = [
   ["-", "not used"], ["t_us", "time, µs"], ["t_ms", "time, ms"], ["t_s", "time, s"],
-  ...["gyro", "accel"].flatMap((sensor) => ["x", "y", "z"].map((axis) => [sensor[0] + axis, `${sensor} ${axis}`])),
+  ...["gyro", "accel", "mag"].flatMap((sensor) => ["x", "y", "z"].map((axis) => [sensor[0] + axis, `${sensor} ${axis}`])),
   ["temp_c", "temperature, °C"],
 ];
 
@@ -140,7 +140,7 @@ function wizardArguments() {
   const more = cut($("more-wizard").value);
   // With a number or a placement, they are given among the other arguments.
   if ($("board-turns").checked && !more.some((arg) => arg.startsWith("--whole-turns"))) args.push("--whole-turns");
-  for (const name of ["gravity", "latitude"]) if (number(`board-${name}`)) args.push(`--${name}=${number(`board-${name}`)}`);
+  for (const name of ["gravity", "latitude", "field"]) if (number(`board-${name}`)) args.push(`--${name}=${number(`board-${name}`)}`);
   return [...args, ...more];
 }
 
@@ -222,7 +222,8 @@ async function ended({ outcome, text, refused }) {
 /** Hands the recordings of the session to the page, to be fitted and exported like those of a file. */
 async function result() {
   const files = await program().read(FOLDER);
-  if (files?.has("calibration/samples.csv")) await page.done(files, $("board-name").value.trim());
+  const field = $("board-field").value.trim().replace(",", ".");
+  if (files?.has("calibration/samples.csv")) await page.done(files, $("board-name").value.trim(), field ? [`--field=${field}`] : []);
 }
 
 async function reconnect() {
@@ -266,8 +267,8 @@ export async function loadJournal(file) {
     await program().ask("unpack", { name: FOLDER, files: own });
     const [, names, unit] = /^(.*) in (\S+)$/.exec(begun.asked.text);
     board.asked = { columns: names.split(",") };
-    const { gravity_mps2: gravity, latitude_deg: latitude, fixture, dwell_s: dwell, whole_turns: whole } = begun.asked;
-    const fields = { "board-name": begun.unit_id, "board-unit": unit, "board-gravity": gravity, "board-latitude": latitude ?? "", "board-fixture": fixture, "board-dwell": dwell };
+    const { gravity_mps2: gravity, latitude_deg: latitude, fixture, dwell_s: dwell, whole_turns: whole, field_ut: field } = begun.asked;
+    const fields = { "board-name": begun.unit_id, "board-unit": unit, "board-gravity": gravity, "board-latitude": latitude ?? "", "board-field": field ?? "", "board-fixture": fixture, "board-dwell": dwell };
     for (const [id, value] of Object.entries(fields)) $(id).value = value;
     $("board-turns").checked = Boolean(whole);
     // What the checkbox does not say.

@@ -225,13 +225,13 @@ async function fitted(mimu, name, more, verify = [], others = []) {
   if (found instanceof Refused) throw found;
 }
 
-/** Calibrates from the recordings of a session with the board called `name`. */
-async function finished(files, name) {
+/** Calibrates from the recordings of a session with the board called `name`. `more`: further arguments. */
+async function finished(files, name, more) {
   cancel();
   Object.assign(state, { files: [], session: { files }, recordings: ["session/calibration"], unit: newUnit(name) });
   $("columns").hidden = true;
   const verify = files.has("verification/samples.csv") ? ["--verify", "session/verification"] : [];
-  await compute((mimu) => fitted(mimu, `the session with ${name}`, [], verify));
+  await compute((mimu) => fitted(mimu, `the session with ${name}`, more, verify));
 }
 
 /** Judges the calibration of the person by the dropped log. */

@@ -15,7 +15,7 @@ let shown = {};
 /** Begins to show a session whose journal is read by `journal`. */
 export function begin(journal) {
   shown = { journal, part: "calibration", step: null, told: [], rate: 0, counted: null };
-  for (const id of ["log", "heard", "aims", "not-yet", "session-sphere", "pose", "held", "phase", "count"]) $(id).replaceChildren();
+  for (const id of ["log", "heard", "aims", "not-yet", "session-sphere", "pose", "held", "phase", "count", "field-off"]) $(id).replaceChildren();
   $("session-bar").value = $("dwell-bar").value = 0;
   $("prompt").textContent = WAITING["warm-up"];
   $("state").textContent = "Its rate is being found …";
@@ -37,7 +37,7 @@ export function tell(event) {
 /** Shows that the session is over: `done`, or stopped. */
 export function end(done) {
   $("pose").replaceChildren();
-  $("state").textContent = "";
+  $("state").textContent = $("field-off").textContent = "";
   $("dwell-bar").value = 0;
   if (done) $("session-bar").value = 1;
   $("prompt").textContent = done ? "The session is finished." : "The session is stopped. It goes on from the last dwell, here or by the command with the journal.";
@@ -94,6 +94,7 @@ const events = {
     poses();
   },
   redo: () => poses(),
+  field: ({ words }) => say(words),
   progress: ({ progress }) => aims(progress),
 };
 
@@ -176,6 +177,7 @@ export function stand({ units: [unit], phase, step }) {
   else if (unit.waiting) $("state").textContent = turning === null ? `Waiting: ${unit.waiting}` : `${capital(unit.waiting)}.`;
   else if (step) $("state").textContent = `Turn it so, and let it rest for ${digits(step.dwell_s)} s.`;
   else if (phase === "warm-up") $("state").textContent = "It is being listened to at rest.";
+  $("field-off").textContent = unit.field ? `${capital(unit.field)}.` : "";
   const at = now();
   const before = shown.counted;
   if (!before || at - before.at > 1 || unit.samples < before.samples) {

@@ -91,7 +91,8 @@ fn look(text: &str, seconds: f64) -> Lines {
     let guessed = match raw {
         true => Guess {
             roles: vec![
-                "accel_x", "accel_y", "accel_z", "gyro_x", "gyro_y", "gyro_z", "-", "-", "-",
+                "accel_x", "accel_y", "accel_z", "gyro_x", "gyro_y", "gyro_z", "mag_x", "mag_y",
+                "mag_z",
             ],
             ..Guess::default()
         },
@@ -104,6 +105,9 @@ fn look(text: &str, seconds: f64) -> Lines {
         "gyro_x" => "gx",
         "gyro_y" => "gy",
         "gyro_z" => "gz",
+        "mag_x" => "mx",
+        "mag_y" => "my",
+        "mag_z" => "mz",
         "temp_c" => "temp_c",
         "t_s" => match guessed.time_unit {
             Some(Decimal::Microsecond) => "t_us",
@@ -165,6 +169,10 @@ mod tests {
         let found = look(&tabs, 3.0);
         assert_eq!(found.columns, ["t_ms", "gx", "gy", "gz", "ax", "ay", "az"]);
         assert!(!found.by_readings);
+        let compass = lines(|k| format!("1,2,{},0,0,4096,9,8,-{k}", k % 2));
+        let compass = compass.replace("MPU6050 OK", "gx,gy,gz,ax,ay,az,mx,my,mz");
+        let found = look(&compass, 3.0);
+        assert_eq!(found.columns[6..], ["mx", "my", "mz"]);
     }
 
     #[test]
@@ -176,7 +184,7 @@ mod tests {
         let found = look(&text, 3.0);
         assert_eq!(
             found.columns,
-            ["ax", "ay", "az", "gx", "gy", "gz", "-", "-", "-"]
+            ["ax", "ay", "az", "gx", "gy", "gz", "mx", "my", "mz"]
         );
         assert_eq!(found.rows[0][2], 8192.0);
     }

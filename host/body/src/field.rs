@@ -29,9 +29,9 @@ const DELAY_S: f64 = 0.1;
 /// Step of the derivative by the delay, s.
 const DELAY_STEP_S: f64 = 1e-3;
 /// A rest whose size or dip of the field is off by this many times the scatter of all rests is left out.
-const CONTRADICTED: f64 = 6.0;
+pub(crate) const CONTRADICTED: f64 = 6.0;
 /// Fewest rests that show a scatter.
-const FEWEST_RESTS: usize = 6;
+pub(crate) const FEWEST_RESTS: usize = 6;
 /// How often rests that the others contradict are looked for.
 const ROUNDS: usize = 3;
 
@@ -58,6 +58,8 @@ pub(crate) struct Field {
     pub halves_rad: f64,
     /// Worst standard deviation of the field's direction, over all poses, rad.
     pub worst_rad: f64,
+    /// Errors at all rests: of its size, and of its part along up.
+    pub at_rest: [Vec<f64>; 2],
 }
 
 /// Time in which the rest contradicts the field.
@@ -108,12 +110,17 @@ impl Field {
         None
     }
 
+    /// Sine of the angle of the field below the level.
+    pub fn sine_of_dip(&self) -> f64 {
+        self.relation.at[DIP]
+    }
+
     /// Angle of the field below the level, degrees.
     pub fn dip_deg(&self) -> Known<Estimate> {
         if self.rests == 0 {
             return Err("no rest shows where up is".into());
         }
-        let sine = self.relation.at[DIP].clamp(-0.999_999, 0.999_999);
+        let sine = self.sine_of_dip().clamp(-0.999_999, 0.999_999);
         let by_sine = (1.0 - sine * sine).sqrt().recip().to_degrees();
         Ok(Estimate {
             value: sine.asin().to_degrees(),
@@ -140,8 +147,14 @@ impl Field {
     }
 }
 
+/// Scatter of errors of which some may be large: the median of the sizes of errors with a normal distribution is 0.67 of its standard deviation.
+pub(crate) fn scatter(errors: impl Iterator<Item = f64>) -> f64 {
+    let sizes = errors.map(f64::abs).collect();
+    mimu_recording::units::median(sizes).unwrap_or(f64::NAN) / 0.6745
+}
+
 /// Derivatives of `C u + o` by C (rows) and o.
-fn by_calibration(u: &Vector3<f64>) -> SMatrix<f64, 3, 12> {
+pub(crate) fn by_calibration(u: &Vector3<f64>) -> SMatrix<f64, 3, 12> {
     let mut by = SMatrix::zeros();
     for axis in 0..3 {
         for k in 0..3 {
@@ -286,19 +299,8 @@ impl<'a> Problem<'a> {
         if own.len() < FEWEST_RESTS {
             return Vec::new();
         }
-        let calibration = relation.calibration();
-        let errors = [
-            own.iter()
-                .map(|(u, _)| calibration.apply(u).norm() - self.size)
-                .collect(),
-            own.iter()
-                .map(|(u, rest)| self.dip(&calibration, u, rest, relation.at[DIP]))
-                .collect(),
-        ];
-        let is_off = errors.map(|errors: Vec<f64>| {
-            let sizes = errors.iter().map(|e| e.abs()).collect();
-            // The median of the sizes of errors with a normal distribution is 0.67 of its standard deviation.
-            let sigma = mimu_recording::units::median(sizes).unwrap_or(f64::NAN) / 0.6745;
+        let is_off = self.errors_at(&own, relation).map(|errors: Vec<f64>| {
+            let sigma = scatter(errors.iter().copied());
             errors
                 .into_iter()
                 .map(|e| e.abs() > CONTRADICTED * sigma)
@@ -309,6 +311,17 @@ impl<'a> Problem<'a> {
             .enumerate()
             .filter(|(k, _)| is_off[0][*k] || is_off[1][*k]);
         off.map(|(_, (_, rest))| *rest).collect()
+    }
+
+    /// Errors at these rests: of the size of the field, and of its part along up.
+    fn errors_at(&self, rests: &[&(Vector3<f64>, Rest)], relation: &Relation) -> [Vec<f64>; 2] {
+        let calibration = relation.calibration();
+        let size = |u: &Vector3<f64>| calibration.apply(u).norm() - self.size;
+        let dip = |u, rest| self.dip(&calibration, u, rest, relation.at[DIP]);
+        [
+            rests.iter().map(|(u, _)| size(u)).collect(),
+            rests.iter().map(|(u, rest)| dip(u, rest)).collect(),
+        ]
     }
 
     /// By how much the field along up differs from that of its dip.
@@ -366,6 +379,7 @@ impl<'a> Problem<'a> {
         Some(Field {
             worst_rad: self.worst(&calibration, &relation.solution.covariance)?,
             rests: self.rests.len(),
+            at_rest: self.errors_at(&self.rests.iter().collect::<Vec<_>>(), &relation),
             size_rms: self.size_rms(&calibration, is_used),
             left_out,
             halves_rad,

@@ -12,6 +12,7 @@ mod errors;
 mod field;
 mod fitted;
 mod judge;
+mod live;
 mod pieces;
 mod relation;
 pub mod result;
@@ -37,6 +38,7 @@ use nalgebra::Rotation3;
 
 pub use accel_delay::accel_delay_ms;
 pub use fitted::{FittedTriad, Known};
+pub use live::{Departure, FieldSoFar};
 pub use split::Split;
 pub use trajectory::ByTrajectory;
 pub use verify::{TriadVerification, verify};
@@ -51,6 +53,21 @@ use series::Series;
 pub struct Options {
     /// Size of the Earth's field at the place, µT. Without it magnetometers are calibrated in units of it.
     pub field_ut: Option<f64>,
+}
+
+impl Options {
+    /// Refuses a field that is found nowhere on the Earth.
+    ///
+    /// # Errors
+    /// The size of the field is impossible.
+    pub fn check(&self) -> Result<()> {
+        let Some(size) = self.field_ut.filter(|size| !(15.0..=75.0).contains(size)) else {
+            return Ok(());
+        };
+        let problem = format!("the Earth's field is 22 to 67 µT, and {size} µT is given");
+        let remedy = "give its size at the place, as a model of the field (WMM, IGRF) has it";
+        Err(Error::new("field", problem, remedy))
+    }
 }
 
 /// The further triads of a body.
@@ -96,13 +113,7 @@ impl Body {
     }
 
     fn fitted(recording: &Recording, unit: &Unit, options: &Options) -> Result<Option<Self>> {
-        if let Some(size) = options.field_ut
-            && !(15.0..=75.0).contains(&size)
-        {
-            let problem = format!("the Earth's field is 22 to 67 µT, and {size} µT is given");
-            let remedy = "give its size at the place, as a model of the field (WMM, IGRF) has it";
-            return Err(Error::new("field", problem, remedy));
-        }
+        options.check()?;
         let first = [TriadKind::Gyro, TriadKind::Accel].map(TriadName::first);
         let triads = recording.triads().into_iter();
         let more: Vec<TriadName> = triads.filter(|name| !first.contains(name)).collect();

@@ -262,5 +262,6 @@ fn table(of: &FittedTriad, raw: RawUnit) -> BodyTriad {
         interval_delay_ms: delay.map(interval),
         lever_arm_mm: arm.map(|arm| arm.map(|e| e.value)),
         interval_lever_arm_mm: arm.map(|arm| arm.map(|e| interval(&e))),
+        judgement: Some(of.judgement.clone()),
     }
 }

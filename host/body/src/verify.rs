@@ -17,7 +17,7 @@ use crate::standing::Standing;
 use crate::{judge, same_body};
 
 /// Errors of a further triad.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TriadVerification {
     /// Rms error over windows, in [`Self::unit`].
     pub rms: f64,

@@ -1,5 +1,7 @@
 //! A run of consecutive rows, column by column.
 
+use std::ops::Range;
+
 use super::columns::{Column, Columns};
 use super::triad_name::TriadName;
 
@@ -87,6 +89,27 @@ impl Batch {
         }
         let more = self.more.iter_mut().flat_map(|(_, axes)| axes);
         more.for_each(Vec::clear);
+    }
+
+    /// Appends these rows of `other`, in every column that it has.
+    pub fn append(&mut self, other: &Self, rows: Range<usize>) {
+        self.step
+            .extend(other.step.get(rows.clone()).unwrap_or_default());
+        let more = other.more.iter().map(|(triad, _)| *triad);
+        let more = more.flat_map(|triad| [0, 1, 2].map(|axis| Column::of(triad, axis)));
+        for column in Column::fixed().chain(more) {
+            let own = other.values(column).and_then(|of| of.get(rows.clone()));
+            if let (Some(own), Some(to)) = (own, self.values_mut(column)) {
+                to.extend_from_slice(own);
+            }
+        }
+    }
+
+    /// Removes the first `count` rows.
+    pub fn cut(&mut self, count: usize) {
+        let mut rest = Self::default();
+        rest.append(self, count..self.len());
+        *self = rest;
     }
 
     /// First column whose length does not fit `columns`, if there is one.

@@ -29,6 +29,32 @@ pub trait InMemory: fmt::Debug + Send + Sync {
     fn append(&self, column: Column, rows: Range<usize>, values: &mut Vec<f64>) -> Result<()>;
 }
 
+impl InMemory for Batch {
+    fn rows(&self) -> usize {
+        self.len()
+    }
+
+    fn columns(&self) -> Columns {
+        let has = |column| self.values(column).is_some_and(|of| !of.is_empty());
+        Columns {
+            step: !self.step.is_empty(),
+            temp_c: has(Column::Temperature),
+            gyro: has(Column::Raw(0)),
+            accel: has(Column::Raw(3)),
+            reference: std::array::from_fn(|i| has(Column::Reference(i))),
+            more: self.more.iter().map(|(triad, _)| *triad).collect(),
+        }
+    }
+
+    fn append(&self, column: Column, rows: Range<usize>, values: &mut Vec<f64>) -> Result<()> {
+        match self.values(column) {
+            Some(own) => values.extend_from_slice(&own[rows]),
+            None => values.extend(self.step[rows].iter().copied().map(f64::from)),
+        }
+        Ok(())
+    }
+}
+
 /// Samples with the pair `number` in the places of the first.
 #[derive(Debug)]
 pub(super) struct PairInMemory {

@@ -58,6 +58,7 @@ impl DeviceSource {
             raw_unit: who.raw_unit(session.port())?,
             sensors: Some(who.settings()),
             rate_hz,
+            has_mag: false,
             nominal: Some(who.nominal()),
             told,
             is_device: true,
@@ -98,6 +99,7 @@ impl DeviceSource {
         Ok(SourceEvent::Samples(Chunk {
             tick,
             values,
+            mag: Vec::new(),
             temp_c: shortest(samples.head.temp_c),
             saturated: samples.head.flags & flags::SATURATED != 0,
             self_test: samples.head.flags & flags::SELF_TEST != 0,

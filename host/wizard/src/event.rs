@@ -171,6 +171,13 @@ pub enum Event {
         /// File of the diagnosis page.
         page: String,
     },
+    /// The field at the magnetometer is not that of the poses before.
+    Field {
+        /// Name of the unit.
+        unit: String,
+        /// How it differs, and what to do.
+        words: String,
+    },
     /// Information for the user.
     Note {
         /// The message.
@@ -255,6 +262,9 @@ pub struct UnitState {
     pub trend_c_per_min: Option<f64>,
     /// Limit of this rate during warm-up, if the session waits for it.
     pub trend_limit_c_per_min: Option<f64>,
+    /// How the field at the magnetometer differs from that of the poses before; `None` while it does not, or if that is not known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub field: Option<String>,
     /// Samples received.
     pub samples: u64,
     /// Missing samples.

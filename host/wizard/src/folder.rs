@@ -393,10 +393,15 @@ impl OpenRecording {
                 };
                 let growing = Growing::resume(&directory, columns, rows, bytes)?;
                 let recording = Recording::open(&directory)?.with_written_times();
+                if recording.columns != columns {
+                    let problem = "its columns are not those that the board writes now";
+                    let remedy = "start a new session in another folder";
+                    return Err(Error::new(directory.display(), problem, remedy));
+                }
                 recording.for_each_batch(
                     |_| {},
                     |batch| {
-                        append(&mut samples, batch);
+                        samples.append(batch, 0..batch.len());
                         Ok(())
                     },
                 )?;
@@ -424,7 +429,7 @@ impl OpenRecording {
     /// Appends rows.
     pub fn write(&mut self, rows: &Batch) -> Result<()> {
         self.growing.write(rows)?;
-        append(&mut self.samples, rows);
+        self.samples.append(rows, 0..rows.len());
         Ok(())
     }
 
@@ -477,16 +482,5 @@ impl OpenRecording {
         let format = SampleFormat::Csv;
         self.growing.finish(&self.manifest, format, None, |_| {})?;
         Ok(folder.file(self.part.name()))
-    }
-}
-
-/// Appends rows to others.
-pub fn append(to: &mut Batch, rows: &Batch) {
-    to.t_s.extend(&rows.t_s);
-    to.step.extend(&rows.step);
-    to.temp_c.extend(&rows.temp_c);
-    for c in 0..6 {
-        to.raw[c].extend(&rows.raw[c]);
-        to.reference[c].extend(&rows.reference[c]);
     }
 }

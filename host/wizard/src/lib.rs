@@ -9,6 +9,7 @@
 //! | [`source`], [`device`] | sources of samples |
 //! | [`text`], [`text_line`], [`regular`] | a board of another maker: its bytes, its lines, and samples at a regular rate from them |
 //! | [`clock`] | its clock, compared with the computer's |
+//! | [`compass`] | its magnetometer: whether the field is that of the poses before |
 //! | [`text_port`], [`relay`] | its port: read by a thread, or by a caller who relays the bytes |
 //! | [`station`] | a unit and its line; a thread reads the port, and reopens it if it has vanished |
 //! | [`turn`] | a session pauses when it has to wait, and its caller resumes it |
@@ -29,6 +30,7 @@
 
 pub mod axes;
 pub mod clock;
+pub mod compass;
 pub mod device;
 pub mod event;
 pub mod folder;

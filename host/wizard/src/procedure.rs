@@ -92,6 +92,9 @@ pub struct SessionConfig {
     /// The population that the units are from, by hand only. Kept with the session, because its poses do not suffice without it.
     #[serde(default)]
     pub prior: Option<Prior>,
+    /// Size of the Earth's field at the place, µT, for a board with a magnetometer; without it the field counts as 1.
+    #[serde(default)]
+    pub field_ut: Option<f64>,
 }
 
 impl SessionConfig {
@@ -460,6 +463,7 @@ mod tests {
             reference_error: None,
             whole_turns: None,
             prior: None,
+            field_ut: None,
         }
     }
 

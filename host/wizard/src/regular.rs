@@ -36,6 +36,8 @@ pub struct Timed {
     pub t_s: f64,
     /// Gyro x, y, z, accelerometer x, y, z, raw.
     pub raw: [f64; 6],
+    /// Magnetometer x, y, z, raw, if there is one.
+    pub mag: Option<[f64; 3]>,
     /// Temperature, °C; NaN if unknown.
     pub temp_c: f64,
 }
@@ -277,6 +279,7 @@ mod tests {
         Timed {
             t_s,
             raw: [k as f64; 6],
+            mag: None,
             temp_c: f64::NAN,
         }
     }

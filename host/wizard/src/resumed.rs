@@ -98,6 +98,7 @@ pub fn resumed(begun: &SessionConfig, now: &SessionConfig, place: &Path) -> Resu
         targets: now.targets,
         mounting_deg: now.mounting_deg,
         reference_error: now.reference_error,
+        field_ut: now.field_ut,
         ..begun.clone()
     })
 }
@@ -127,6 +128,7 @@ mod tests {
             reference_error: None,
             whole_turns: None,
             prior: None,
+            field_ut: None,
         }
     }
 

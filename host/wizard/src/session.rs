@@ -3,8 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use mimu::{Calibration, DiagnosisResult, Fit, Options, Prepared, Prior, Sensor, Verdict, fit};
+use mimu_body::{Body, Options as BodyOptions};
 use mimu_recording::result_file::stage;
-use mimu_recording::{Argument, ClockRate, Error, Result};
+use mimu_recording::{Argument, ClockRate, Error, Recording, Result};
 use serde::Serialize;
 
 use crate::axes;
@@ -16,7 +17,7 @@ use crate::resumed::resumed;
 use crate::source::Unit;
 use crate::station::Connect;
 use crate::unit_session::UnitSession;
-use crate::verdict::{Judged, judge, prepared};
+use crate::verdict::{Judged, judge, judge_further, prepared};
 use crate::wizard::{Phased, Stop, Wizard};
 use mimu_equipment::drive::Driver;
 
@@ -334,14 +335,23 @@ impl OpenSession<'_> {
         Ok(fits)
     }
 
+    /// The further triads of unit `k`, whose gyro and accelerometer have this fit.
+    fn further(&self, k: usize, fitted: &Fit) -> Result<Option<Body>> {
+        let recording = Recording::open(&self.file(k, Part::Calibration.name()))?;
+        let field_ut = self.wizard.config.field_ut;
+        Body::of(&recording, fitted, &BodyOptions { field_ut })
+    }
+
     /// The affine calibration of unit `k`, judged by its verification.
     fn affine_calibration(&mut self, k: usize, fitted: Fit) -> Result<AffineCalibration> {
         let created = self.wizard.units[k]
             .folder
             .created(Part::Verification, now)?;
         let mut calibration = Calibration::of(&fitted, &[], &created)?;
+        let body = self.further(k, &fitted)?;
         let other = prepared(&self.file(k, Part::Verification.name()))?;
-        let judged = self.judged(k, &other, &calibration, &fitted, Part::Verification)?;
+        let found = (&fitted, body.as_ref());
+        let judged = self.judged(k, &other, &mut calibration, found, Part::Verification)?;
         calibration.judgement = Some(judged.judgement.clone());
         let passed = judged.passed();
         let rough = judged.rough().filter(|_| passed);
@@ -400,16 +410,22 @@ impl OpenSession<'_> {
         Ok(())
     }
 
-    /// Judges a calibration by a recording, and reports the result.
+    /// Judges a calibration by a recording, and reports the result. `body`: its further triads, which it gets as far as they may be stored.
     fn judged(
         &mut self,
         k: usize,
         by: &Prepared,
-        calibration: &Calibration,
-        fitted: &Fit,
+        calibration: &mut Calibration,
+        (fitted, body): (&Fit, Option<&Body>),
         part: Part,
     ) -> Result<Judged> {
-        let judged = judge(by, calibration, Some(fitted))?;
+        let mut judged = judge(by, calibration, Some(fitted))?;
+        if let Some(body) = body {
+            calibration.body = body.tables(by.manifest.raw_unit);
+            let recording = Recording::open(&self.file(k, part.name()))?;
+            let dwells = &fitted.prepared.dwells.list;
+            judged.further = judge_further(body, dwells, calibration, &recording)?;
+        }
         let passed = judged.passed();
         let unit = &mut self.wizard.units[k];
         unit.folder.add(Entry::Verified { passed })?;

@@ -17,6 +17,8 @@ pub struct Unit {
     pub sensors: Option<SensorSettings>,
     /// Sample rate, Hz.
     pub rate_hz: f64,
+    /// Whether it has a magnetometer.
+    pub has_mag: bool,
     /// Model of gyro and accelerometer from the data sheets, raw to SI; accurate enough to find which side is up. `None`: estimated from gravity.
     pub nominal: Option<[Affine<f64>; 2]>,
     /// Its reset cause and stored calibration, in words.
@@ -34,6 +36,8 @@ pub struct Chunk {
     pub tick: u64,
     /// Raw readings, gyro x, y, z, accelerometer x, y, z.
     pub values: Vec<[f64; 6]>,
+    /// Raw readings of the magnetometer beside them; empty without one.
+    pub mag: Vec<[f64; 3]>,
     /// Temperature, °C; NaN if unknown.
     pub temp_c: f64,
     /// Whether one of the readings may be at a rail.

@@ -74,6 +74,7 @@ impl TextBoard {
             raw_unit: text.raw_unit,
             sensors: None,
             rate_hz: rate_hz.unwrap_or(f64::NAN),
+            has_mag: false,
             nominal: (text.raw_unit == RawUnit::Si)
                 .then(|| [Affine::identity(), Affine::identity()]),
             told: Vec::new(),
@@ -143,6 +144,8 @@ impl TextBoard {
     fn greet(&mut self) -> Result<()> {
         let rate_hz = self.regular.rate_hz().unwrap_or(f64::NAN);
         self.unit.rate_hz = rate_hz;
+        // MotionCal's lines are known once they come.
+        self.unit.has_mag = self.lines.has_mag();
         if !(4.0..=50_000.0).contains(&rate_hz) {
             let problem = format!("{rate_hz:.3} lines arrive per second");
             let remedy = "let the board write 20 to 1000 lines per second, or check the unit of its clock column";
@@ -210,14 +213,15 @@ impl TextBoard {
     pub fn take(&mut self, bytes: &[u8], now_s: f64) {
         for reading in self.lines.take(bytes) {
             self.heard_s = now_s;
-            let Reading { raw, temp_c, t_s } = reading;
+            let Reading { t_s, .. } = reading;
             if let Some(t_s) = t_s {
                 self.compare_clocks(t_s, now_s);
             }
             let timed = Timed {
                 t_s: t_s.unwrap_or(now_s),
-                raw,
-                temp_c,
+                raw: reading.raw,
+                mag: reading.mag,
+                temp_c: reading.temp_c,
             };
             if self.regular.take(timed) {
                 while let Some((tick, sample)) = self.regular.rest() {
@@ -268,10 +272,14 @@ impl TextBoard {
             same && c.saturated == saturated && c.end() == tick
         };
         match self.ready.back_mut() {
-            Some(SourceEvent::Samples(chunk)) if fits(chunk) => chunk.values.push(sample.raw),
+            Some(SourceEvent::Samples(chunk)) if fits(chunk) => {
+                chunk.values.push(sample.raw);
+                chunk.mag.extend(sample.mag);
+            }
             _ => self.ready.push_back(SourceEvent::Samples(Chunk {
                 tick,
                 values: vec![sample.raw],
+                mag: sample.mag.into_iter().collect(),
                 temp_c: sample.temp_c,
                 saturated,
                 self_test: false,

@@ -6,7 +6,7 @@
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::labelled::Line;
 use mimu_recording::look::column_named;
-use mimu_recording::{Column, Decimal};
+use mimu_recording::{Column, Decimal, TriadName};
 
 /// Longest line, bytes. No board writes a line as long as this with ten numbers.
 const LONGEST: usize = 400;
@@ -27,6 +27,8 @@ pub struct Columns {
 
 /// Names of the raw columns of a recording in sketches.
 const CHANNELS: [&str; 6] = ["gx", "gy", "gz", "ax", "ay", "az"];
+/// The same of a magnetometer.
+const MAG: [&str; 3] = ["mx", "my", "mz"];
 /// Units of the clock columns `t_us`, `t_ms` and `t_s`.
 const CLOCKS: [Decimal; 3] = [Decimal::Microsecond, Decimal::Millisecond, Decimal::Second];
 /// Range of counters with 32 bits.
@@ -46,13 +48,13 @@ fn wraps_s(unit: Decimal) -> f64 {
 }
 
 impl Columns {
-    /// Parses names separated by commas: `ax`, `ay`, `az`, `gx`, `gy`, `gz` or what loggers call them (`AccX`, `gyro_y`), at most one of `t_us`,
-    /// `t_ms` and `t_s`, `temp_c`, and `-` for a column to ignore.
+    /// Parses names separated by commas: `ax`, `ay`, `az`, `gx`, `gy`, `gz` or what loggers call them (`AccX`, `gyro_y`), `mx`, `my`, `mz` (all or none),
+    /// at most one of `t_us`, `t_ms` and `t_s`, `temp_c`, and `-` for a column to ignore.
     ///
     /// Errors: an unknown or repeated name, or a missing axis.
     pub fn parse(names: &str) -> Result<Self> {
         let refused = |problem: String| {
-            let remedy = "name ax, ay, az, gx, gy and gz in the order of the line, also t_us, t_ms or t_s, temp_c, and `-` for what is not needed";
+            let remedy = "name ax, ay, az, gx, gy and gz in the order of the line, also mx, my and mz, t_us, t_ms or t_s, temp_c, and `-` for what is not needed";
             Error::new(format!("columns {names:?}"), problem, remedy).about(Argument::TextColumns)
         };
         let (mut columns, mut clock) = (Vec::new(), None);
@@ -63,7 +65,9 @@ impl Columns {
                 "micros" => *unit == Decimal::Microsecond,
                 _ => name.strip_prefix("t_") == Some(unit.symbol()),
             };
-            let channel = CHANNELS.iter().position(|c| *c == name);
+            let at = |names: &[&str]| names.iter().position(|c| *c == name);
+            let channel = at(&CHANNELS).map(Column::Raw);
+            let channel = channel.or(at(&MAG).map(|axis| Column::of(TriadName::MAG, axis)));
             let column = match (name, CLOCKS.into_iter().find(of_clock)) {
                 ("-", _) => None,
                 (_, Some(unit)) => {
@@ -71,9 +75,12 @@ impl Columns {
                     Some(Column::Time)
                 }
                 _ => {
-                    let known = channel.map(Column::Raw).or(Column::from_name(name));
+                    let known = channel.or(Column::from_name(name));
                     let known = known.or_else(|| column_named(name));
-                    let known = known.filter(|c| matches!(c, Column::Raw(_) | Column::Temperature));
+                    let known = known.filter(|c| match c {
+                        Column::More(triad, _) => *triad == TriadName::MAG,
+                        c => matches!(c, Column::Raw(_) | Column::Temperature),
+                    });
                     let none = || refused(format!("{name:?} is not a column"));
                     Some(known.ok_or_else(none)?)
                 }
@@ -83,8 +90,12 @@ impl Columns {
             }
             columns.push(column);
         }
-        for (k, name) in CHANNELS.iter().enumerate() {
-            if !columns.contains(&Some(Column::Raw(k))) {
+        let of_mag = (0..3).map(|axis| Some(Column::of(TriadName::MAG, axis)));
+        let with_mag = of_mag.clone().any(|column| columns.contains(&column));
+        let wanted = (0..6).map(|k| Some(Column::Raw(k))).chain(of_mag);
+        let wanted = wanted.zip(CHANNELS.iter().chain(&MAG));
+        for (column, name) in wanted.take(if with_mag { 9 } else { 6 }) {
+            if !columns.contains(&column) {
                 return Err(refused(format!("{name} is missing")));
             }
         }
@@ -95,10 +106,10 @@ impl Columns {
         })
     }
 
-    /// `Raw:` of MotionCal: accelerometer, gyro, and a magnetometer, which is ignored.
+    /// `Raw:` of MotionCal: accelerometer, gyro and magnetometer.
     fn motion_cal() -> Self {
         let mut columns = [3, 4, 5, 0, 1, 2].map(|c| Some(Column::Raw(c))).to_vec();
-        columns.extend([None; 3]);
+        columns.extend([0, 1, 2].map(|axis| Some(Column::of(TriadName::MAG, axis))));
         Self {
             names: "Raw:ax,ay,az,gx,gy,gz,mx,my,mz".into(),
             columns,
@@ -110,6 +121,12 @@ impl Columns {
     pub fn has_clock(&self) -> bool {
         self.clock.is_some()
     }
+
+    /// Whether the lines contain a magnetometer.
+    fn has_mag(&self) -> bool {
+        let mag = Some(Column::of(TriadName::MAG, 0));
+        self.columns.contains(&mag)
+    }
 }
 
 /// The values of a line.
@@ -117,6 +134,8 @@ impl Columns {
 pub struct Reading {
     /// Gyro x, y, z, accelerometer x, y, z, raw.
     pub raw: [f64; 6],
+    /// Magnetometer x, y, z, raw, if there is one.
+    pub mag: Option<[f64; 3]>,
     /// Temperature, °C; NaN if there is none.
     pub temp_c: f64,
     /// The board's clock, s, if there is one.
@@ -225,15 +244,19 @@ impl Lines {
         self.labels.get_or_insert(labels);
         let mut reading = Reading {
             raw: [0.0; 6],
+            mag: None,
             temp_c: f64::NAN,
             t_s: None,
         };
         for (column, number) in self.columns.columns.iter().zip(numbers) {
             match (column, self.columns.clock) {
-                (Some(Column::Raw(_) | Column::Temperature), _) if number.abs() > LARGEST => {
+                (Some(column), _) if *column != Column::Time && number.abs() > LARGEST => {
                     return None;
                 }
                 (Some(Column::Raw(c)), _) => reading.raw[*c] = *number,
+                (Some(Column::More(_, axis)), _) => {
+                    reading.mag.get_or_insert_default()[*axis] = *number;
+                }
                 (Some(Column::Temperature), _) => reading.temp_c = *number,
                 (Some(Column::Time), Some(unit)) => {
                     let (t_s, wraps_s) = (number * seconds(unit), wraps_s(unit));
@@ -299,6 +322,11 @@ impl Lines {
     /// Whether the lines contain the board's clock.
     pub fn has_clock(&self) -> bool {
         self.columns.has_clock()
+    }
+
+    /// Whether the lines contain a magnetometer.
+    pub fn has_mag(&self) -> bool {
+        self.columns.has_mag()
     }
 
     /// Name of the clock column if its time ran `factor` times more slowly.
@@ -402,6 +430,21 @@ mod tests {
         let words = lines.others_in_words().unwrap();
         assert_eq!(words, "3 lines without the label \"Raw\" are left out");
         assert_eq!(readings[0].raw, [1.0, 2.0, 3.0, 10.0, 20.0, 8192.0]);
+        assert_eq!(readings[0].mag, Some([400.0, 500.0, 600.0]));
+    }
+
+    #[test]
+    fn a_magnetometer_is_read_with_all_its_axes_or_refused() {
+        for names in ["mx,my,mz", "MagX,MagY,MagZ", "mag_x,mag_y,mag_z"] {
+            let (readings, lines) = read(&format!("{SIX},{names}"), "1,2,3,4,5,6,7,-8,9\n");
+            assert_eq!(readings[0].raw, [4.0, 5.0, 6.0, 1.0, 2.0, 3.0], "{names}");
+            assert_eq!(readings[0].mag, Some([7.0, -8.0, 9.0]), "{names}");
+            assert!(lines.has_mag());
+        }
+        let (readings, lines) = read(SIX, "1,2,3,4,5,6\n");
+        assert!(readings[0].mag.is_none() && !lines.has_mag());
+        let (none, _) = read(&format!("{SIX},mx,my,mz"), "1,2,3,4,5,6,7,1.4e99,9\n");
+        assert!(none.is_empty());
     }
 
     #[test]
@@ -441,7 +484,8 @@ mod tests {
             ("ax,ay,az,gx,gy", "gz is missing"),
             ("ax,ay,az,gx,gy,gz,ax", "ax occurs twice"),
             ("t_s,t_ms,ax,ay,az,gx,gy,gz", "t_ms occurs twice"),
-            ("ax,ay,az,gx,gy,gz,mx", "\"mx\" is not a column"),
+            ("ax,ay,az,gx,gy,gz,mx,mz", "my is missing"),
+            ("ax,ay,az,gx,gy,gz,gyro2_x", "\"gyro2_x\" is not a column"),
         ] {
             let error = Columns::parse(names).unwrap_err().to_string();
             assert!(error.contains(says), "{error}");

@@ -9,13 +9,14 @@ use mimu::signal::stillness::GUARD_S;
 use mimu::{Fit, Sensor, Triad};
 use mimu_core::compensation::Affine;
 use mimu_recording::error::{Argument, Error, Result};
-use mimu_recording::{ClockRate, Columns, Manifest, REPORTED_SHARE, Recorded};
+use mimu_recording::{ClockRate, Columns, Manifest, REPORTED_SHARE, Recorded, TriadName};
 use nalgebra::Vector3;
 
 use self::conditions::{Tilts, Turns, motion_limits, rate_limit_dps};
 use self::rows::{Pending, known};
 use self::spins::Spinning;
 use crate::axes;
+use crate::compass::Compass;
 use crate::event::{Event, UnitState};
 use crate::folder::{Entry, Folder, OpenRecording, Part};
 use crate::procedure::{Fixture, SessionConfig};
@@ -96,6 +97,7 @@ pub struct UnitSession {
     /// Whether it has completed the requested dwell.
     pub done: bool,
     watch: Watch,
+    compass: Compass,
     /// Model raw to SI: from the data sheet, estimated from gravity, or the calibration so far.
     nominal: Option<[Affine<f64>; 2]>,
     /// Whether it is the calibration so far.
@@ -155,6 +157,7 @@ impl UnitSession {
         let unit = &station.unit;
         Self {
             watch: Watch::new(unit.rate_hz, config.fixture != Fixture::Table),
+            compass: Compass::default(),
             nominal: unit.nominal,
             calibrated: false,
             fitted: None,
@@ -196,7 +199,7 @@ impl UnitSession {
     pub fn begin(&mut self, part: Part, config: &SessionConfig) -> Result<()> {
         let unit = &self.station.unit;
         let table = config.fixture == Fixture::Table;
-        let columns = Columns {
+        let mut columns = Columns {
             step: true,
             temp_c: true,
             gyro: true,
@@ -204,6 +207,9 @@ impl UnitSession {
             reference: [table; 6],
             ..Columns::default()
         };
+        if unit.has_mag {
+            columns.add(TriadName::MAG);
+        }
         let mut manifest = Manifest::new(
             unit.name.clone(),
             unit.rate_hz,
@@ -278,9 +284,11 @@ impl UnitSession {
                     self.keep(&chunk);
                     self.count_turns(&chunk);
                     self.tell_turns(tell);
+                    self.compass.take(&chunk, self.station.unit.rate_hz);
                     if let Some(seen) = self.watch.take(&chunk) {
                         self.seen = Some(seen);
                         self.stand(&seen, round.config, round.step);
+                        self.judge_field(&seen, tell);
                         if let (Some(step), false) = (round.step, self.done) {
                             self.update_dwell(&seen, round, step, tell)?;
                             if self.done {
@@ -414,6 +422,16 @@ impl UnitSession {
         // An estimated gyro model has no scale.
         let rate = self.rate(seen);
         self.state.rate_dps = rate.map(|rate| rate.dot(&up.normalize()).to_degrees());
+    }
+
+    fn judge_field(&mut self, seen: &LastSecond, tell: &mut Vec<Event>) {
+        let rests = seen.motion.iter().all(|m| *m <= 1.0);
+        let words = self.compass.judge(seen, rests);
+        self.state.field.clone_from(&self.compass.words);
+        tell.extend(words.map(|words| Event::Field {
+            unit: self.name(),
+            words,
+        }));
     }
 
     /// Unit vector upwards, from the last second.
@@ -651,6 +669,7 @@ impl UnitSession {
             self.hopeless = Some(error.clone());
         }
         let fitted = fitted.ok()?;
+        self.compass.refit(recording, &fitted);
         if let [Some(gyro), Some(accel)] = Sensor::BOTH.map(|s| fitted.sensor(s)) {
             self.fitted = Some([gyro, accel].map(|s| s.estimated.triad.clone()));
         }

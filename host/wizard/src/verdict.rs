@@ -2,8 +2,9 @@
 
 use mimu::calibration::verify::{PowerOn, SensorVerification, WholeTurnsOfAxis, verify_since};
 use mimu::signal::stillness::STILL_FACTOR;
-use mimu::{Calibration, Figure, Fit, Judgement, JudgementKind, Prepared, Sensor, Warning};
-use mimu_recording::{Recording, Result};
+use mimu::{Calibration, Dwell, Figure, Fit, Judgement, JudgementKind, Prepared, Sensor, Warning};
+use mimu_body::{Body, TriadVerification};
+use mimu_recording::{Recording, Result, TriadName};
 use serde::Serialize;
 use std::path::Path;
 
@@ -129,6 +130,57 @@ fn rough_turns(turned: &WholeTurnsOfAxis) -> Option<String> {
     })
 }
 
+/// A further triad of the board, such as a magnetometer. Gyro and accelerometer are stored whatever it is.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FurtherJudged {
+    /// The triad.
+    pub triad: TriadName,
+    /// The worse one of its judgements by the fit and by the verification.
+    pub judgement: Judgement,
+    /// Whether the calibration file has it.
+    pub in_file: bool,
+    /// Dwells of the calibration that are left out, because the others contradict them.
+    pub left_out_dwells: Vec<i32>,
+    /// Its errors in the verification.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub verified: Option<TriadVerification>,
+}
+
+/// Judges the further triads of a calibration by the verification recording `by`, and takes those that must not be stored out of it. `dwells` are those of the
+/// fit.
+pub fn judge_further(
+    body: &Body,
+    dwells: &[Dwell],
+    calibration: &mut Calibration,
+    by: &Recording,
+) -> Result<Vec<FurtherJudged>> {
+    let mut found = mimu_body::verify(by, calibration)?;
+    let made: Vec<TriadName> = calibration.body.iter().map(|t| t.triad).collect();
+    let fitted = body.triads.iter();
+    let fitted = fitted.map(|t| (t.name, &t.judgement, t.left_out.as_slice()));
+    let refused = body.refused.iter().map(|(name, why)| (*name, why, &[][..]));
+    let judged = fitted.chain(refused).map(|(triad, judgement, spans)| {
+        let verified = found.remove(&triad.to_string());
+        let again = verified.iter().map(|v| &v.judgement);
+        let worst = again.fold(judgement, |a, b| if b.kind > a.kind { b } else { a });
+        let is_out = |d: &&Dwell| spans.iter().any(|[a, b]| d.start_s < *b && d.last_s > *a);
+        FurtherJudged {
+            triad,
+            judgement: worst.clone(),
+            in_file: made.contains(&triad) && worst.needs_consent().is_none(),
+            left_out_dwells: dwells.iter().filter(is_out).map(|d| d.step).collect(),
+            verified,
+        }
+    });
+    let judged: Vec<FurtherJudged> = judged.collect();
+    calibration.body.retain_mut(|own| {
+        let of = judged.iter().find(|of| of.triad == own.triad);
+        own.judgement = of.map(|of| of.judgement.clone());
+        of.is_some_and(|of| of.in_file)
+    });
+    Ok(judged)
+}
+
 /// Figures of a calibration from the verification.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Judged {
@@ -139,6 +191,9 @@ pub struct Judged {
     /// What the gyro reads for whole turns that the fit has not used.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub whole_turns: Vec<WholeTurnsOfAxis>,
+    /// Further triads of the board.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub further: Vec<FurtherJudged>,
     /// Why it must not be stored.
     pub broken: Vec<String>,
     /// Warnings for the user.
@@ -203,6 +258,7 @@ pub fn judge(by: &Prepared, calibration: &Calibration, promised: Option<&Fit>) -
         judgement: judgement(calibration.judgement.clone(), found.judgement, &broken),
         sensors,
         whole_turns: found.whole_turns,
+        further: Vec::new(),
         broken,
         warnings: found.warnings,
     })
@@ -249,6 +305,7 @@ mod tests {
             broken: sensors.iter().filter_map(SensorJudged::broken).collect(),
             sensors,
             whole_turns: Vec::new(),
+            further: Vec::new(),
             warnings: Vec::new(),
         }
     }

@@ -476,6 +476,7 @@ mod tests {
         Chunk {
             tick,
             values: (0..rows).map(row).collect(),
+            mag: Vec::new(),
             temp_c: 20.0 + tick as f64 / 60e3,
             saturated: false,
             self_test: false,

@@ -63,6 +63,9 @@ pub struct DiagnoseArgs {
     whole: WholeTurnArgs,
     #[command(flatten)]
     noise: NoiseArgs,
+    /// Size of the Earth's field at the place, µT, for a recording with a magnetometer; without it the field counts as 1
+    #[arg(long, value_name = "UT")]
+    field: Option<f64>,
     #[command(flatten)]
     writing: WritingArgs,
     #[command(flatten)]
@@ -236,9 +239,10 @@ pub fn run(args: &DiagnoseArgs, command_line: &str) -> Result<Status> {
         next: args.next,
     };
     let before = &diagnosis.before;
-    let body = samples
-        .as_ref()
-        .map(|of| Body::of(of, before, &Options::default()));
+    let options = Options {
+        field_ut: args.field,
+    };
+    let body = samples.as_ref().map(|of| Body::of(of, before, &options));
     let body = body.transpose()?.flatten();
     let split = pairs.map(|pairs| pairs.split);
     let further = Further::of(samples.as_ref(), &done, split)?;

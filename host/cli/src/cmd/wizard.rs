@@ -12,6 +12,7 @@ use mimu::prior::Prior;
 use mimu::quantity::normal_gravity;
 use mimu::readable::STANDARD_GRAVITY;
 use mimu::result::diagnosis::DiagnosisResult;
+use mimu_body::Options as BodyOptions;
 use mimu_equipment::drive::{Person, TextDriver};
 use mimu_equipment::step::Step;
 use mimu_recording::error::{Error, Result};
@@ -52,6 +53,9 @@ pub(crate) struct WizardArgs {
     /// Latitude, degrees
     #[arg(long, allow_negative_numbers = true)]
     latitude: Option<f64>,
+    /// Size of the Earth's field at the place, µT, for a board with a magnetometer; without it the field counts as 1
+    #[arg(long, value_name = "UT")]
+    field: Option<f64>,
     #[command(flatten)]
     text: TextArgs,
     /// Length of a dwell, s
@@ -121,8 +125,8 @@ struct SpinArgs {
 /// Options for a board of another maker, which writes its readings as lines of text.
 #[derive(Args)]
 pub(crate) struct TextArgs {
-    /// The board writes lines of text. Names of the numbers of a line in their order: ax, ay, az, gx, gy, gz; t_us, t_ms or t_s (the
-    /// board's clock); temp_c; `-` for one that is not needed. MotionCal's `Raw:` is recognised
+    /// The board writes lines of text. Names of the numbers of a line in their order: ax, ay, az, gx, gy, gz; mx, my, mz (a magnetometer);
+    /// t_us, t_ms or t_s (the board's clock); temp_c; `-` for one that is not needed. MotionCal's `Raw:` is recognised
     #[arg(long, value_name = "NAMES", num_args = 0..=1, default_missing_value = "ax,ay,az,gx,gy,gz")]
     text: Option<String>,
     /// Bits per second of a board that writes lines of text
@@ -299,6 +303,8 @@ impl WizardArgs {
         let reference_error = self.reference_error(fixture)?;
         manifest.reference_error = reference_error.clone();
         manifest.check("wizard")?;
+        let field_ut = self.field;
+        BodyOptions { field_ut }.check()?;
         Ok(SessionConfig {
             text: self.text.words(),
             fixture,
@@ -321,6 +327,7 @@ impl WizardArgs {
             reference_error,
             whole_turns,
             prior,
+            field_ut,
         })
     }
 }

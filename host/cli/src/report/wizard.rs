@@ -6,7 +6,7 @@ use mimu_wizard::event::Event;
 use mimu_wizard::folder::Part;
 use mimu_wizard::refit::Progress;
 use mimu_wizard::session::{Outcome, UnitOutcome};
-use mimu_wizard::verdict::{Judged, SensorJudged};
+use mimu_wizard::verdict::{FurtherJudged, Judged, SensorJudged};
 
 use super::terminal::text;
 use super::verify::whole_turns;
@@ -42,7 +42,7 @@ fn of_event(event: &Event) -> Markup {
             p.line { "verdict: " (verdict.name()) "; " @if effects.is_empty() { "no effect was found" } @else { "found: " (effects.join(", ")) } }
             p.line { "page: " (page) }
         }
-        Event::Note { words } => p.line { "    " (words) },
+        Event::Field { words, .. } | Event::Note { words } => p.line { "    " (words) },
         // The view asks the question and waits for the answer.
         Event::Question { .. } => {}
     } }
@@ -70,7 +70,17 @@ fn words(judged: &Judged) -> Markup {
         p.line { "judgement: " (judged.judgement) }
         @for of in &judged.sensors { p.line { (sensor(of)) } }
         @for turned in &judged.whole_turns { p.line { "gyro  " (whole_turns(turned)) } }
+        @for of in &judged.further { (further(of)) }
         @for broken in &judged.broken { p.line { "FAILED, nothing was stored: " (broken) } }
+    }
+}
+
+fn further(of: &FurtherJudged) -> Markup {
+    let left_out: Vec<String> = of.left_out_dwells.iter().map(i32::to_string).collect();
+    html! {
+        @if of.in_file { p.line { (of.triad) " is judged " (of.judgement) } }
+        @else { p.line { (of.triad) " is not in the file: " (of.judgement) } }
+        @if !left_out.is_empty() { p.line { (of.triad) ": left out, because the other poses contradict them: dwells " (left_out.join(", ")) } }
     }
 }
 

@@ -111,6 +111,7 @@ fn state_line(state: &SessionState) -> String {
     ) {
         parts.push(format!("{temp_c:.1} °C, {trend:+.2} of {limit} °C/min"));
     }
+    parts.extend(unit.field.clone());
     match (&unit.waiting, unit.left_s) {
         (Some(why), _) => parts.push(format!("waits: {}", hint::of_waiting(why))),
         (None, Some(left_s)) => parts.push(format!("measures, {left_s:.1} s left")),

@@ -5,6 +5,8 @@ use mimu_recording::{RawUnit, TriadName};
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use serde::{Deserialize, Serialize};
 
+use crate::judgement::Judgement;
+
 /// A triad of a body beyond the first gyro and accelerometer.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
@@ -56,6 +58,9 @@ pub struct BodyTriad {
     /// Halves of its 95 % intervals.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub interval_lever_arm_mm: Option<[f64; 3]>,
+    /// Its judgement.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub judgement: Option<Judgement>,
 }
 
 impl BodyTriad {

@@ -159,13 +159,9 @@ impl OpenSession<'_> {
         for ((k, found), plain) in (0..).zip(found).zip(plain) {
             let Some(mut found) = found else { continue };
             let by = prepared(&self.file(k, Part::Confirmation.name()))?;
-            let judged = self.judged(
-                k,
-                &by,
-                &found.calibration,
-                &found.fitted,
-                Part::Confirmation,
-            )?;
+            let body = self.further(k, &found.fitted)?;
+            let of = (&found.fitted, body.as_ref());
+            let judged = self.judged(k, &by, &mut found.calibration, of, Part::Confirmation)?;
             found.calibration.judgement = Some(judged.judgement.clone());
             if !judged.passed() {
                 continue;

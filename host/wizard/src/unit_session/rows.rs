@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use mimu_recording::Batch;
+use mimu_recording::{Batch, Column, TriadName};
 
 use crate::procedure::SessionConfig;
 use crate::source::Chunk;
@@ -16,15 +16,10 @@ pub(super) fn known(step: &Step, config: &SessionConfig) -> [f64; 6] {
     [rate.x, rate.y, rate.z, force.x, force.y, force.z]
 }
 
-/// A copy of some rows, without known inputs.
+/// A copy of some rows.
 pub(super) fn part(rows: &Batch, range: Range<usize>) -> Batch {
     let mut out = Batch::default();
-    out.t_s.extend(&rows.t_s[range.clone()]);
-    out.step.extend(&rows.step[range.clone()]);
-    out.temp_c.extend(&rows.temp_c[range.clone()]);
-    for c in 0..6 {
-        out.raw[c].extend(&rows.raw[c][range.clone()]);
-    }
+    out.append(rows, range);
     out
 }
 
@@ -43,6 +38,7 @@ pub(super) struct Pending {
 impl Pending {
     /// Appends the samples of a chunk of a unit of this nominal rate.
     pub fn add(&mut self, chunk: &Chunk, rate_hz: f64) {
+        let mut mag = chunk.mag.iter();
         for ((k, t_s), row) in (0..).zip(chunk.times(rate_hz)).zip(&chunk.values) {
             let least_s = self.last_s.map_or(t_s, |last| last + 0.5 / rate_hz);
             if t_s + self.later_s < least_s {
@@ -58,6 +54,12 @@ impl Pending {
                 rows.raw[c].push(row[c]);
                 rows.reference[c].push(f64::NAN);
             }
+            for (axis, value) in mag.next().into_iter().flatten().enumerate() {
+                let column = Column::of(TriadName::MAG, axis);
+                rows.values_mut(column)
+                    .into_iter()
+                    .for_each(|to| to.push(*value));
+            }
         }
     }
 
@@ -68,10 +70,7 @@ impl Pending {
 
     /// Takes the rows before index `to`, and keeps the others.
     pub fn take(&mut self, to: usize) -> Batch {
-        let mut rows = part(&self.rows, 0..to);
-        for c in 0..6 {
-            rows.reference[c].extend(&self.rows.reference[c][..to]);
-        }
+        let rows = part(&self.rows, 0..to);
         self.cut(to);
         rows
     }
@@ -79,14 +78,7 @@ impl Pending {
     /// Removes the first rows.
     pub fn cut(&mut self, first: usize) {
         self.ticks.drain(..first);
-        let rows = &mut self.rows;
-        rows.t_s.drain(..first);
-        rows.step.drain(..first);
-        rows.temp_c.drain(..first);
-        for c in 0..6 {
-            rows.raw[c].drain(..first);
-            rows.reference[c].drain(..first);
-        }
+        self.rows.cut(first);
     }
 
     /// Forgets the rows, but not the time.

@@ -12,7 +12,7 @@ use nalgebra::Vector3;
 use super::rows::part;
 use super::{Dwell, Round, UnitSession};
 use crate::event::Event;
-use crate::folder::{Entry, append};
+use crate::folder::Entry;
 use crate::source::Chunk;
 use crate::spin::{Spin, SpinState};
 use crate::waiting::Waiting;
@@ -376,7 +376,8 @@ impl UnitSession {
         let mut ends = part(&self.pending.rows, 0..self.pending.before(to));
         let begin = self.pending.before(dwell.from);
         ends.step[begin..].fill(self.number);
-        append(&mut rows, &ends);
+        ends.reference = Default::default();
+        rows.append(&ends, 0..ends.len());
         let prepared = Prepared::of(recording.manifest().clone(), &rows, STILL_FACTOR)
             .map_err(|error| error.to_string())?;
         match prepared.spun(gyro, &accel.inverse) {

@@ -586,6 +586,7 @@ pub fn column_named(name: &str) -> Option<Column> {
     match meaning(name) {
         Meaning::Gyro(axis) => Some(Column::Raw(axis)),
         Meaning::Accel(axis) => Some(Column::Raw(3 + axis)),
+        Meaning::Mag(axis) => Some(Column::of(TriadName::MAG, axis)),
         Meaning::Temperature => Some(Column::Temperature),
         _ => None,
     }
