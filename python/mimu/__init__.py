@@ -18,7 +18,7 @@ from mimu._allan import Allan, Channel, NoiseCoefficient, allan
 from mimu._design import (
     CoefficientSigma, Design, NextExperiment, ParameterSigma, Shown, design, next_experiment,
 )
-from mimu._diagnosis import Coefficient, Diagnosis, Effect, Leftover, NotExcited, Rejected, SensorDiagnosis, diagnose
+from mimu._diagnosis import Coefficient, Diagnosis, Effect, Leftover, NotExcited, Pairs, Rejected, SensorDiagnosis, TurnPart, diagnose
 from mimu._error import Error
 from mimu._files import Export, SensorVerification, Verification, export, load, load_noise, verify
 from mimu._fit import Dwell, Figures, Fit, Parameter, SensorFit, SessionsFit, fit, fit_sessions

@@ -11,7 +11,7 @@ from mimu._arguments import CalibrationLike, NoiseLike, arguments, calibration_o
 from mimu._error import Error
 from mimu._fit import Keep, Steps
 from mimu._mimu import Recording
-from mimu._result import GivesCalibration, Message
+from mimu._result import GivesCalibration, Judgement, Message
 
 
 @dataclass(frozen=True)
@@ -75,6 +75,33 @@ class SensorDiagnosis:
     noise_floor: float
 
 
+@dataclass(frozen=True)
+class TurnPart:
+    """A part of what turns err by, root mean square, rad."""
+
+    rms: float
+    #: Bounds of the 95 % interval.
+    lower: float
+    upper: float
+    #: The same by noise alone.
+    noise_floor: float
+
+
+@dataclass(frozen=True)
+class Pairs:
+    """What the pairs of a body (a gyro and an accelerometer each) err by after turns."""
+
+    turns: int
+    #: The part that all share.
+    common: TurnPart
+    #: The part of each, by its number: ``"2"`` for ``gyro2`` with ``accel2``.
+    own: dict[str, TurnPart]
+    #: Whether noise does not explain the common part.
+    exceeds_noise: bool
+    #: Judgement of each by its own part; empty for two pairs, or if noise explains the common part.
+    judged: dict[str, Judgement]
+
+
 class Diagnosis(GivesCalibration):
     """The effects behind the residual of a unit."""
 
@@ -88,6 +115,8 @@ class Diagnosis(GivesCalibration):
     not_excited: list[NotExcited]
     leftover: list[Leftover]
     sensors: dict[str, SensorDiagnosis]
+    #: Of recordings with several pairs; else None.
+    body: Pairs | None
     #: Warnings, one sentence each, with its ``kind``.
     warnings: list[Message]
 

@@ -75,7 +75,6 @@ pub(crate) fn diagnose(
     noise: Option<&Noise>,
 ) -> PyResult<Diagnosis> {
     let all = sources(py, &recordings)?;
-    let first = all[0].clone();
     let second = verify.map(|recording| recording.source.clone());
     let given = calibration.map(|c| (c.model.clone(), c.name.clone()));
     let noise = noise.map(|noise| noise.file.clone());
@@ -83,23 +82,25 @@ pub(crate) fn diagnose(
     let now = created.clone();
     let work = move || {
         let args: DiagnoseArgs = of_contents("diagnose", arguments)?;
-        let open = |source: &Source| {
-            source.samples()?;
-            args.opened(&*source.opener(), noise.as_deref())
-        };
-        let mut all: Vec<_> = all.iter().map(open).collect::<Result<_>>()?;
+        let samples = all
+            .iter()
+            .chain(&second)
+            .map(|of| of.samples().map(|of| &**of));
+        let samples: Vec<_> = samples.collect::<Result<_>>()?;
+        let open = |source: &Source| args.opened(&*source.opener(), noise.as_deref());
+        let mut prepared: Vec<_> = all.iter().map(open).collect::<Result<_>>()?;
         let second = second.as_ref().map(open).transpose()?;
         let name = second.as_ref().map(|second| second.manifest.device.clone());
-        let recordings = Recordings {
-            first: all.remove(0),
-            more: all,
+        let mut recordings = Recordings {
+            first: prepared.remove(0),
+            more: prepared,
             second,
             given: given.as_ref().map(|(model, _)| model.as_ref()),
         };
+        let split = args.split(&samples, &mut recordings)?;
         let given = given.as_ref().map(|(_, name)| name.as_str());
         let found = diagnosed(recordings, [name.as_deref(), given], &now, &|_| ())?;
-        let samples = first.samples()?;
-        let further = Further::of(Some(&**samples), &found, None)?;
+        let further = Further::of(Some(samples[0]), &found, split)?;
         Ok((found, further))
     };
     let (done, further) = done(py, work, refused)?;

@@ -13,6 +13,7 @@ mod field;
 mod fitted;
 mod judge;
 mod live;
+mod pairs;
 mod pieces;
 mod relation;
 pub mod result;
@@ -24,21 +25,18 @@ mod standing;
 pub mod trajectory;
 mod verify;
 
-use mimu::fit::{Fit, Options as FitOptions, fit};
+use mimu::fit::Fit;
 use mimu::judgement::Judgement;
-use mimu::prepared::Prepared;
 use mimu::quantity::{PerSensor, Sensor};
-use mimu::result::fit::FitResult;
 use mimu::signal::dwell::Dwell;
-use mimu::signal::stillness::DwellSearch;
 use mimu::triad::Estimate;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{RawUnit, Recording, TriadKind, TriadName};
-use nalgebra::Rotation3;
 
 pub use accel_delay::accel_delay_ms;
 pub use fitted::{FittedTriad, Known};
 pub use live::{Departure, FieldSoFar};
+pub use pairs::Pairs;
 pub use split::Split;
 pub use trajectory::ByTrajectory;
 pub use verify::{TriadVerification, verify};
@@ -150,79 +148,6 @@ impl Body {
         let refused = self.refused.iter().map(|(_, why)| why.clone());
         Judgement::worst(of.chain(refused))
             .unwrap_or_else(|| judge::undetermined("it has no further triad"))
-    }
-}
-
-/// The pairs of a body: a gyro and an accelerometer with one number each.
-#[derive(Debug, Clone)]
-pub struct Pairs {
-    /// What their turns err by, split into the part that all share and the part of each.
-    pub split: Split,
-    /// The recording of the first pair without the part that all share; `None` for two pairs, or if noise explains what they share.
-    pub first: Option<Prepared>,
-}
-
-impl Pairs {
-    /// Each pair of `recording` fitted like the first (`unit`), their errors in its frame. `None` if there is only one, or if turns that two of them share are too few.
-    ///
-    /// # Errors
-    /// The samples cannot be read.
-    pub fn of(recording: &Recording, unit: &Fit, search: DwellSearch) -> Result<Option<Self>> {
-        let triads = recording.triads();
-        let kinds = [TriadKind::Gyro, TriadKind::Accel];
-        let has = |number| {
-            let mut names = kinds.iter().map(|kind| TriadName {
-                kind: *kind,
-                number,
-            });
-            names.all(|name| triads.contains(&name))
-        };
-        let numbers: Vec<u8> = (2..=TriadName::MOST).filter(|n| has(*n)).collect();
-        let body = match numbers.is_empty() {
-            true => None,
-            false => Body::of(recording, unit, &Options::default())?,
-        };
-        let Some(body) = body else {
-            return Ok(None);
-        };
-        let mut others = Vec::new();
-        for number in numbers {
-            // The accelerometer of a pair gives the frame of its fit.
-            let [gyro, accel] = kinds.map(|kind| {
-                let name = TriadName { kind, number };
-                body.triads.iter().find(|triad| triad.name == name)
-            });
-            let Some(gyro) = gyro else {
-                continue;
-            };
-            let prepared = Prepared::read(&recording.pair(number)?, search, |_| ())?;
-            // A pair that is not determined for itself says nothing of turns.
-            if let Ok(fit) = fit(prepared, FitOptions::IN_SAMPLE) {
-                others.push((number, fit, accel.unwrap_or(gyro).rotation));
-            }
-        }
-        let first = [(1, unit, Rotation3::identity())].into_iter();
-        let others = others
-            .iter()
-            .map(|(number, fit, turn)| (*number, fit, *turn));
-        let all: Vec<_> = first.chain(others).collect();
-        let errors = split::turn_errors(&all);
-        let Some((errors, mut split)) = errors.and_then(|of| split::split(&of).map(|s| (of, s)))
-        else {
-            return Ok(None);
-        };
-        let mut first = None;
-        if split.exceeds_noise {
-            for (number, prepared) in split::own_turns(&all, &errors) {
-                if number == 1 {
-                    first = Some(prepared.clone());
-                }
-                if let Ok(fit) = fit(prepared, FitOptions::default()) {
-                    split.judged.insert(number, FitResult::of(&fit).judgement);
-                }
-            }
-        }
-        Ok(Some(Self { split, first }))
     }
 }
 

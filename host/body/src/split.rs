@@ -51,7 +51,7 @@ pub struct TurnErrors {
     pub conditions: Vec<[f64; 4]>,
     /// Mean square of each turn's error by what is known to be common, rad²: the Earth's rate about an unknown heading.
     pub shared: Vec<f64>,
-    /// For each pair its dwell in which each turn ends.
+    /// For each pair its dwell in which each turn ends; empty if the turns are of several recordings.
     pub places: Vec<Vec<Option<usize>>>,
 }
 
@@ -261,6 +261,28 @@ impl PairErrors {
 }
 
 impl TurnErrors {
+    /// Those of several recordings, of the pairs that all of them have. `None` without a recording.
+    pub fn joined(all: &[Self]) -> Option<Self> {
+        let (first, more) = all.split_first()?;
+        let mut joined = first.clone();
+        for next in more {
+            let turns = [&joined, next].map(|of| of.conditions.len() as f64);
+            joined.pairs.retain_mut(|pair| {
+                let Some(of) = next.pairs.iter().find(|of| of.pair == pair.pair) else {
+                    return false;
+                };
+                pair.errors.extend(&of.errors);
+                pair.noise.extend(&of.noise);
+                pair.left = (turns[0] * pair.left + turns[1] * of.left) / (turns[0] + turns[1]);
+                true
+            });
+            joined.conditions.extend(&next.conditions);
+            joined.shared.extend(&next.shared);
+            joined.places.clear();
+        }
+        Some(joined)
+    }
+
     /// Mean square of the own part of each pair over the turns that it has. Two pairs are divided by what each has in common with the other.
     fn own(&self) -> Vec<f64> {
         let mut own = vec![[0.0; 2]; self.pairs.len()];

@@ -165,20 +165,48 @@ impl Further {
     }
 }
 
-/// The pairs of the recording with these `samples`, if it has several. With a given calibration no pair is fitted.
-fn pairs(
-    args: &DiagnoseArgs,
-    samples: Option<&Recording>,
-    first: &Prepared,
-) -> Result<Option<Pairs>> {
-    let several = samples.filter(|of| of.triads().len() > Sensor::BOTH.len());
-    let Some(samples) = several.filter(|_| args.calibration.is_none()) else {
-        return Ok(None);
-    };
-    // A first pair that is not determined is refused by the diagnosis.
-    match fit(first.clone(), FitOptions::IN_SAMPLE) {
-        Ok(fit) => Pairs::of(samples, &fit, args.still.search()),
-        Err(_) => Ok(None),
+impl DiagnoseArgs {
+    /// Takes what all pairs of a body err by in common out of the turns of `recordings`, whose `samples` are in the order of the command line, the one that judges last.
+    /// Gives the split of that part for those in which effects are sought. With a given calibration no pair is fitted.
+    ///
+    /// # Errors
+    /// The samples cannot be read.
+    pub fn split(
+        &self,
+        samples: &[&Recording],
+        recordings: &mut Recordings,
+    ) -> Result<Option<Split>> {
+        let pairs = |samples: &[&Recording], all: &mut [&mut Prepared]| {
+            let several = |of: &&Recording| of.triads().len() > Sensor::BOTH.len();
+            if recordings.given.is_some() || !samples.iter().all(several) {
+                return Ok(None);
+            }
+            // A first pair that is not determined is refused by the diagnosis.
+            let fits = all
+                .iter()
+                .map(|of| fit((**of).clone(), FitOptions::IN_SAMPLE));
+            let Ok(fits) = fits.collect::<Result<Vec<_>>>() else {
+                return Ok(None);
+            };
+            let each: Vec<_> = samples.iter().copied().zip(&fits).collect();
+            let Some(pairs) = Pairs::of(&each, self.still.search())? else {
+                return Ok(None);
+            };
+            for (of, own) in all.iter_mut().zip(pairs.first) {
+                if let Some(own) = own {
+                    **of = own;
+                }
+            }
+            Ok(Some(pairs.split))
+        };
+        let (first, more) = (&mut recordings.first, &mut recordings.more);
+        let mut all: Vec<&mut Prepared> = std::iter::once(first).chain(more).collect();
+        let (sought, judging) = samples.split_at(all.len().min(samples.len()));
+        let split = pairs(sought, &mut all)?;
+        if let Some(second) = &mut recordings.second {
+            pairs(judging, &mut [second])?;
+        }
+        Ok(split)
     }
 }
 
@@ -205,18 +233,15 @@ pub fn run(args: &DiagnoseArgs, command_line: &str) -> Result<Status> {
     let all: Result<Vec<Prepared>> = args.recordings.iter().map(open).collect();
     let mut all = all?;
     args.writing.check(args.output.as_deref())?;
-    let samples = samples.take().into_iter().next();
-    let pairs = pairs(args, samples.as_ref(), &all[0])?;
-    let first = all.remove(0);
-    let recordings = Recordings {
-        first: pairs
-            .as_ref()
-            .and_then(|of| of.first.clone())
-            .unwrap_or(first),
+    let mut recordings = Recordings {
+        first: all.remove(0),
         more: all,
         second: args.verify.as_ref().map(open).transpose()?,
         given: given.as_ref(),
     };
+    let samples = samples.take();
+    let split = args.split(&samples.iter().collect::<Vec<_>>(), &mut recordings)?;
+    let samples = samples.first();
     let shown = |path: &Option<PathBuf>| path.as_ref().map(|p| p.display().to_string());
     let names = [shown(&args.verify), shown(&args.calibration)];
     let now = now();
@@ -242,10 +267,9 @@ pub fn run(args: &DiagnoseArgs, command_line: &str) -> Result<Status> {
     let options = Options {
         field_ut: args.field,
     };
-    let body = samples.as_ref().map(|of| Body::of(of, before, &options));
+    let body = samples.map(|of| Body::of(of, before, &options));
     let body = body.transpose()?.flatten();
-    let split = pairs.map(|pairs| pairs.split);
-    let further = Further::of(samples.as_ref(), &done, split)?;
+    let further = Further::of(samples, &done, split)?;
     let mut out = Results::new(report::diagnosis_text(found, detail) + &further.text());
     let place = diagnosis.before.prepared.place.clone();
     let refusal = args.writing.refusal(&found.judgement, &place, MISFIT);

@@ -43,7 +43,7 @@ use crate::estimate::least_squares::POORLY_DETERMINED;
 use crate::fit::{Fit, Options, fit, fit_biases};
 use crate::one_unit::{RAW_UNIT, refuse_unlike};
 use crate::prepared::Prepared;
-use crate::quantity::{Sensor, significant};
+use crate::quantity::{Sensor, plural, significant};
 use crate::recording_problem::OfRecording;
 use crate::triad::{Covariance, Part, Triad};
 use crate::warning::Warning;
@@ -76,7 +76,7 @@ impl Verdict {
 pub enum Untestable {
     /// Too few residuals: their number, and the number of affine parameters.
     #[error(
-        "{0} residuals for {1} affine parameters do not suffice for a judgement; record more poses"
+        "too few for a judgement: {} for {}; record more poses", plural(*.0 as u64, "residual"), plural(*.1 as u64, "affine parameter")
     )]
     Residuals(usize, usize),
     /// Whichever part is held out, the rest of the recording does not determine the calibration.

@@ -15,12 +15,14 @@ impl ErrorFigures {
     /// The figures of one triad of `fit`.
     pub fn of_fit(fit: &Fit, sensor: &SensorFit) -> Self {
         let held_out = sensor.held_out_rms();
+        // Of a unit in one pose, with the matrix given, the input does not change: no share of it can remain.
+        let input = Some(input_size(&fit.prepared, sensor)).filter(|size| *size > 0.0);
         Self {
             sensor: sensor.sensor,
             readable: sensor.figure.readable(sensor.sensor),
             error: held_out.unwrap_or(sensor.rms()),
             unseen: held_out.is_some(),
-            input: input_size(&fit.prepared, sensor),
+            input: input.unwrap_or(f64::INFINITY),
             test: sensor.test,
             cause: None,
             too_few: too_few(sensor),
