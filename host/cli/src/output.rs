@@ -9,6 +9,7 @@ use anstyle::AnsiColor;
 use indicatif::{ProgressBar, ProgressStyle};
 use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::{Staged, stage};
+pub use mimu_wizard::session::now;
 use serde::Serialize;
 
 use crate::arguments::JsonArgs;
@@ -51,12 +52,6 @@ pub(crate) fn quoted(argument: &str) -> String {
         true => argument.to_owned(),
         false => format!("'{}'", argument.replace('\'', r"'\''")),
     }
-}
-
-/// The present time, RFC 3339, in whole seconds.
-pub fn now() -> String {
-    let now = jiff::Timestamp::now().round(jiff::Unit::Second);
-    now.unwrap_or_default().to_string()
 }
 
 /// Progress of work that takes long: a bar on a terminal, nothing in a pipe. In the browser it is a line `progress: WHAT THOUSANDTHS` on the standard

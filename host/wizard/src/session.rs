@@ -460,7 +460,8 @@ impl OpenSession<'_> {
     }
 }
 
-fn now() -> String {
+/// The present time, RFC 3339, in whole seconds.
+pub fn now() -> String {
     let now = jiff::Timestamp::now().round(jiff::Unit::Second);
     now.unwrap_or_default().to_string()
 }
