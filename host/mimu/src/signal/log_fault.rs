@@ -6,16 +6,23 @@
 
 use std::ops::Range;
 
+use nalgebra::{Matrix4, Vector3, Vector4};
+
 use crate::quantity::Sensor;
 use crate::signal::blocks::{Condensed, pool, quantile};
 use mimu_recording::health::{Fault, Finding};
 use mimu_recording::{Manifest, RAW_COLUMNS, RawUnit};
 
 /// Ranges of accelerometers double from one to the next: 2, 4, 8, 16 g. Largest deviation of the ratio of two magnitudes at rest from a
-/// power of two, in powers of two: an offset of 0.1 g moves the magnitudes by up to a tenth.
+/// power of two, in powers of two: an offset of 0.1 g moves the magnitudes by up to a tenth. A larger one is found as the centre of all rests.
 const OF_POWER: f64 = 0.25;
 /// Least number of rests with each magnitude, and with each order of the columns: one rest may be a turn, or a part in free fall.
 const FEWEST: usize = 3;
+/// Least number of rests that show whether one sphere has them all: it has four numbers.
+const FEWEST_OF_SPHERE: usize = 10;
+/// Largest deviation from the sphere, as a share of its radius, of nine rests in ten: scale factors and angles are within some percent, and two ranges
+/// differ by half.
+const ON_SPHERE: f64 = 0.08;
 /// Largest difference between two levels of a gyro at rest, as a share of the range of the accelerometer's levels.
 const SAME_LEVEL: f64 = 0.03;
 
@@ -84,7 +91,7 @@ fn range(still: &[Still], manifest: &Manifest) -> Option<([usize; 2], Fault)> {
     };
     let others = [-3.0, -2.0, -1.0, 1.0, 2.0, 3.0];
     let other = others.into_iter().find(|power| near(*power) >= FEWEST)?;
-    if near(0.0) < FEWEST {
+    if near(0.0) < FEWEST || on_one_sphere(still) {
         return None;
     }
     let class = |k: usize| {
@@ -101,6 +108,34 @@ fn range(still: &[Still], manifest: &Manifest) -> Option<([usize; 2], Fault)> {
     let pair = classed.windows(2).find(|pair| pair[0].1 != pair[1].1)?;
     let ratio = 2f64.powf(if pair[1].1 { other } else { -other });
     Some(([pair[0].0, pair[1].0], Fault::RangeChanged { ratio }))
+}
+
+/// Whether one bias makes the specific force alike in all rests. A bias of half a g, which some parts have, gives magnitudes of 0.5 and 1.5 g in one range.
+fn on_one_sphere(still: &[Still]) -> bool {
+    if still.len() < FEWEST_OF_SPHERE {
+        return false;
+    }
+    let rests = || {
+        still
+            .iter()
+            .map(|s| Vector3::from_column_slice(&s.mean[3..]))
+    };
+    // |u|^2 = 2 b u + (r^2 - b^2): b and the rest by least squares.
+    let (mut square, mut right) = (Matrix4::zeros(), Vector4::zeros());
+    for u in rests() {
+        let row = (2.0 * u).push(1.0);
+        square += row * row.transpose();
+        right += row * u.norm_squared();
+    }
+    let Some(found) = square.cholesky().map(|of| of.solve(&right)) else {
+        return false;
+    };
+    let bias = found.xyz();
+    let radius = (found.w + bias.norm_squared()).sqrt();
+    let mut off: Vec<f64> = rests()
+        .map(|u| ((u - bias).norm() / radius - 1.0).abs())
+        .collect();
+    quantile(&mut off, 0.9).is_some_and(|most| most < ON_SPHERE)
 }
 
 /// The segments before and after the columns change places, and the change.

@@ -224,6 +224,24 @@ fn the_row_in_which_the_accelerometers_range_changes_is_named_and_neither_part_i
     }
 }
 
+/// Some parts have zeros of half a g (a log of `shenshikexmu/IMUCalibration-Gesture` has 0.42 and 0.50 g on two axes).
+#[test]
+fn a_bias_of_half_a_g_is_no_change_of_range() {
+    for seed in 20..24 {
+        let mut samples = Log::new(seed).session(30);
+        let g = samples.raw[3..]
+            .iter()
+            .flatten()
+            .fold(0.0, |most, u| f64::max(most, *u))
+            / 1.1;
+        for (column, bias) in samples.raw[3..].iter_mut().zip([0.02, 0.42, 0.5]) {
+            column.iter_mut().for_each(|u| *u = (*u + bias * g).round());
+        }
+        let prepared = by_hand(&samples).unwrap();
+        assert_eq!(prepared.dwells.fault, None, "{seed}");
+    }
+}
+
 #[test]
 fn sessions_without_a_fault_of_the_log_have_none() {
     for seed in 20..30 {
