@@ -2,6 +2,7 @@
 
 use mimu::judgement::{Judgement, JudgementKind};
 use mimu::quantity::significant;
+use mimu::triad::Estimate;
 
 use crate::errors::Errors;
 use crate::field::{Field, LeftOut};
@@ -18,6 +19,9 @@ const MOST_LEFT_OUT: f64 = 0.25;
 const SUSPECT_LEFT_OUT: f64 = 0.1;
 /// Standard deviation of the direction of the field beyond which a calibration is not determined, rad: 3 degrees.
 const DETERMINED_RAD: f64 = 0.052;
+
+/// Latitude beyond which the field points down in the north and up in the south, degrees: the magnetic equator is within 15 degrees of the other.
+const MAGNETIC_EQUATOR_DEG: f64 = 20.0;
 
 /// The recording does not determine a triad.
 pub(crate) fn undetermined(why: impl std::fmt::Display) -> Judgement {
@@ -116,6 +120,28 @@ pub(crate) fn determines(field: &Field) -> Result<(), Judgement> {
     Err(undetermined(format!(
         "the direction of the field is {by} in some poses: bring each axis to point each way, and turn about all three"
     )))
+}
+
+/// The judgement if the field points up in the north, or down in the south: a magnetometer whose axes are mirrored reads it reversed, and fits as well. Near the equator
+/// both occur.
+pub(crate) fn mirrored(dip_deg: &Estimate, latitude_deg: Option<f64>) -> Option<Judgement> {
+    let latitude = latitude_deg.filter(|latitude| latitude.abs() > MAGNETIC_EQUATOR_DEG)?;
+    let dip = dip_deg.value;
+    if dip * latitude >= 0.0 || dip.abs() < dip_deg.interval {
+        return None;
+    }
+    let [points, there] = if dip < 0.0 {
+        ["up", "south"]
+    } else {
+        ["down", "north"]
+    };
+    Some(Judgement::new(
+        JudgementKind::Suspect,
+        format!(
+            "the field points {points} by {} deg, as it does in the {there}: an axis of the magnetometer has the wrong sign, or two are exchanged",
+            significant(dip.abs())
+        ),
+    ))
 }
 
 const MOVE_AWAY: &str = "move away from steel, motors and phones, and record again";

@@ -133,6 +133,13 @@ impl Body {
                 Err(why) => body.refused.push((name, why)),
             }
         }
+        for triad in &mut body.triads {
+            let dip = triad.dip_deg.as_ref().and_then(|dip| dip.as_ref().ok());
+            let mirrored =
+                dip.and_then(|dip| judge::mirrored(dip, recording.manifest.latitude_deg));
+            let all = mirrored.into_iter().chain([triad.judgement.clone()]);
+            triad.judgement = Judgement::worst(all).unwrap_or_else(|| triad.judgement.clone());
+        }
         Ok(Some(body))
     }
 

@@ -147,6 +147,9 @@ pub(super) fn section(body: &BodyResult) -> Markup {
                 p.line { (place.triad) ": no " (name(what)) ": " (why) }
             }
         }
+        @for place in places.iter().filter(|p| p.dip_deg.as_ref().is_some_and(|dip| dip.value < 0.0)) {
+            p.line { (place.triad) ": the field points up, as it does in the south; in the north an axis of it has the wrong sign, or two are exchanged (--latitude)" }
+        }
         @for (triad, result) in &body.sensors {
             @if !result.judgement.is_good() { p.line { (triad) " is judged " (result.judgement) } }
             @if !result.left_out_s.is_empty() { p.line { (triad) ": left out, because the rest contradicts them: " (spans(&result.left_out_s)) } }

@@ -15,7 +15,7 @@ use serde_json::Value;
 
 use super::command::{all_refused, done, json, mimu, says};
 
-const PLAN: &str = "format = \"mimu-plan/1\"\ndevice = \"board\"\nsample_rate_hz = 100.0\ncarrier = \"hands\"\n\
+const PLAN: &str = "format = \"mimu-plan/1\"\nsamples = \"csv\"\ndevice = \"board\"\nsample_rate_hz = 100.0\ncarrier = \"hands\"\n\
     gravity_mps2 = 9.80665\nlead_in_s = 8.0\n[[step]]\nposes = 24\ndwell_s = 3.0\n";
 
 /// The second chip is turned by a quarter about z, 30 mm away and 6 ms late; the magnetometer is 12 ms late.
@@ -174,6 +174,38 @@ fn a_log_without_rests_is_read_once() {
         let read = ran.stderr.matches("4000 rows at").count();
         assert_eq!(read, 1, "{}", ran.stderr);
         assert!(!ran.stderr.contains("exists"), "{}", ran.stderr);
+    }
+}
+
+/// A magnetometer with two axes exchanged reads the field reversed, which only the hemisphere shows.
+#[test]
+fn a_magnetometer_with_mirrored_axes_is_suspect() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let mag = RIG.split("[[triad]]\nname = \"gyro2\"").next().unwrap();
+    let rig = format!("{mag}[[triad]]\nname = \"mag\"\n");
+    record(at, "unit", &rig, 5);
+    let samples = at.join("unit/samples.csv");
+    let text = std::fs::read_to_string(&samples).unwrap();
+    let exchanged = text.replacen("mag_x,mag_y", "mag_y,mag_x", 1);
+    assert_ne!(exchanged, text);
+    std::fs::write(&samples, exchanged).unwrap();
+    let said = done(at, "fit unit --field 50");
+    says(
+        &said,
+        &["mag: the field points up, as it does in the south"],
+    );
+    for (latitude, kind) in [(48.0, "suspect"), (-48.0, "good")] {
+        let manifest = at.join("unit/recording.toml");
+        let text = std::fs::read_to_string(&manifest).unwrap();
+        let others = text
+            .lines()
+            .filter(|line| !line.starts_with("latitude_deg"));
+        let others: String = others.map(|line| format!("{line}\n")).collect();
+        std::fs::write(&manifest, format!("{others}latitude_deg = {latitude:.1}\n")).unwrap();
+        let found = json(at, "fit unit --field 50");
+        let judgement = &found["sensors"]["mag"]["judgement"];
+        assert_eq!(judgement["kind"], kind, "{judgement}");
     }
 }
 
