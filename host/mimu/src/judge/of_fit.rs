@@ -10,6 +10,7 @@ use crate::quantity::{Figure, significant};
 use crate::readable;
 use crate::recording_problem::RecordingProblem;
 use crate::unseen::{self, Test};
+use crate::warning::Warning;
 
 impl ErrorFigures {
     /// The figures of one triad of `fit`.
@@ -82,6 +83,14 @@ fn of_groups(sensor: &SensorFit) -> Vec<Judgement> {
         .collect()
 }
 
+/// `Untested` if the recording has a gyro that it does not calibrate for want of turns: the calibration is then that of an accelerometer, which nobody asked for.
+fn without_turns(fit: &Fit) -> Option<Judgement> {
+    let is_it = |of: &&Warning| matches!(of, Warning::Of(_, why) if **why == Warning::NoTurn);
+    let why = fit.warnings.iter().find(is_it)?;
+    let reason = format!("{why}; if the accelerometer is all you want, calibrate it alone");
+    Some(Judgement::new(JudgementKind::Untested, reason))
+}
+
 impl Judgement {
     /// The judgement of a fit: the worst that its errors, its recording and its warnings lead to.
     pub fn of_fit(fit: &Fit) -> Self {
@@ -91,9 +100,9 @@ impl Judgement {
         let by_input = input::judgements(&problems, fit.all_warnings());
         let by_errors = errors::judge(&figures);
         let by_groups = fit.sensors.iter().flat_map(of_groups);
-        // The input comes first: of two equally bad reasons it is the cause.
-        let all = by_input.into_iter().chain([by_errors.clone()]);
-        let all = all.chain(by_groups);
+        // What is missing and the input come first: of two equally bad reasons they are the cause.
+        let all = without_turns(fit).into_iter().chain(by_input);
+        let all = all.chain([by_errors.clone()]).chain(by_groups);
         Self::worst(all).unwrap_or(by_errors)
     }
 }

@@ -93,9 +93,18 @@ fn by_hand(samples: &Samples) -> mimu_recording::error::Result<Prepared> {
 }
 
 fn first_rows(samples: &Samples, rows: usize) -> Samples {
+    kept(samples, |row| row < rows)
+}
+
+/// The rows that `keep` takes.
+fn kept(samples: &Samples, keep: impl Fn(usize) -> bool) -> Samples {
+    let of = |column: &Vec<f64>| {
+        let each = column.iter().enumerate().filter(|(row, _)| keep(*row));
+        each.map(|(_, value)| *value).collect()
+    };
     Samples {
-        t_s: samples.t_s[..rows].to_vec(),
-        raw: samples.raw.each_ref().map(|column| column[..rows].to_vec()),
+        t_s: of(&samples.t_s),
+        raw: samples.raw.each_ref().map(of),
         ..Samples::default()
     }
 }
@@ -240,6 +249,33 @@ fn a_bias_of_half_a_g_is_no_change_of_range() {
         let prepared = by_hand(&samples).unwrap();
         assert_eq!(prepared.dwells.fault, None, "{seed}");
     }
+}
+
+/// Every second second is missing: no turn is complete, and the calibration has no gyro.
+#[test]
+fn a_fit_whose_gyro_has_no_turns_is_not_good() {
+    let samples = Log::new(6).session(30);
+    let second = RATE_HZ as usize;
+    let prepared = by_hand(&kept(&samples, |row| (row / second).is_multiple_of(2))).unwrap();
+    let both = fit(prepared.clone(), Options::default()).unwrap();
+    assert!(both.sensor(Sensor::Gyro).is_none());
+    let judgement = Judgement::of_fit(&both);
+    assert_eq!(judgement.kind, JudgementKind::Untested, "{judgement}");
+    assert!(judgement.reason.contains("no turn connects"), "{judgement}");
+    let only = Some(Sensor::Accel);
+    let alone = fit(
+        prepared,
+        Options {
+            only,
+            ..Options::default()
+        },
+    )
+    .unwrap();
+    let judgement = Judgement::of_fit(&alone);
+    assert!(
+        !judgement.reason.contains("no turn connects"),
+        "{judgement}"
+    );
 }
 
 #[test]
