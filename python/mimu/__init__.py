@@ -33,8 +33,8 @@ __version__ = _version("mimu")
 __all__ = [
     "Allan", "Biases", "Calibration", "Cause", "Channel", "Coefficient", "CoefficientSigma", "Consistency", "Density", "Design", "Diagnosis", "Dwell",
     "Effect", "Error", "Estimate", "Export", "Figures", "Fit", "Judgement", "Leftover", "Message", "Mounted", "Nees", "NextExperiment", "Noise",
-    "NoiseCoefficient", "NoiseInUse", "NotExcited", "Parameter", "ParameterSigma", "Recording", "Rejected",
-    "SensorDiagnosis", "SensorFit", "SensorVerification", "SessionsFit", "Shown", "Verification", "allan", "design", "diagnose",
+    "NoiseCoefficient", "NoiseInUse", "NotExcited", "Pairs", "Parameter", "ParameterSigma", "Recording", "Rejected",
+    "SensorDiagnosis", "SensorFit", "SensorVerification", "SessionsFit", "Shown", "TurnPart", "Verification", "allan", "design", "diagnose",
     "export", "fit", "fit_sessions", "fit_table", "fit_table_schema", "load", "load_noise", "next_experiment", "noise_in_use", "not_fitted", "read",
     "thermal", "verify",
 ]

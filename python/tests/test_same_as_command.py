@@ -93,6 +93,32 @@ def test_a_diagnosis_is_that_of_the_command(folder: Path, by_hand: mimu.Recordin
     assert [effect.id for effect in found.effects] == [effect["id"] for effect in command["effects"]]
 
 
+def test_a_body_is_split_as_by_the_command(by_hand: mimu.Recording, tmp_path: Path) -> None:
+    # Three pairs that read one motion: what the recorded unit errs by is common to them.
+    random = np.random.default_rng(3)
+    mounted = [np.eye(3) + random.normal(scale=0.01, size=(3, 3)) for _ in range(6)]
+    for name in ("one", "two"):
+        triads = [readings @ turned for turned, readings in zip(mounted, 3 * [by_hand.gyro, by_hand.accel], strict=True)]
+        log = np.column_stack([by_hand.t, *(of + random.normal(scale=0.3, size=of.shape) for of in triads)])
+        names = [f"{kind}{number}_{axis}" for number in ("", 2, 3) for kind in ("gyro", "accel") for axis in "xyz"]
+        for columns, file in ((19, f"{name}.csv"), (7, f"{name}-alone.csv")):
+            np.savetxt(tmp_path / file, log[:, :columns], delimiter=",", header=",".join(["t_s", *names][:columns]), comments="", fmt="%.6f")
+    given = {"gravity": 9.80665, "raw_unit": "count", "device": "array"}
+    one, two, *alone = (mimu.read(tmp_path / f"{name}.csv", **given) for name in ("one", "two", "one-alone", "two-alone"))
+    found = mimu.diagnose([one], verify=[two])
+    command = json_of("diagnose", tmp_path / "one.csv", "--verify", tmp_path / "two.csv", "--gravity=9.80665", "--raw-unit=count", "--device=array")
+    assert found.to_dict()["body"] == command["body"] and found.to_dict()["sensors"] == command["sensors"]
+    body = found.body
+    assert body is not None and body.turns == command["body"]["turns"] and sorted(body.own) == sorted(body.judged) == ["1", "2", "3"]
+    assert body.exceeds_noise and body.common.lower < body.common.rms < body.common.upper and body.own["2"].rms < 0.5 * body.common.rms
+    assert body.judged["3"].kind == command["body"]["judged"]["3"]["kind"]
+    # It is taken out of the recording that is diagnosed, and out of the one that judges.
+    whole = mimu.diagnose(alone[:1], verify=alone[1:])
+    assert whole.body is None
+    for rms in (lambda of: of.sensors["gyro"].held_out_rms_before, lambda of: of.to_dict()["second"]["before"]["sensors"]["gyro"]["rms"]):
+        assert rms(found) < 0.7 * rms(whole)
+
+
 def test_noise_is_that_of_the_command(at_rest: mimu.Recording, tmp_path: Path) -> None:
     path = at_rest.save(tmp_path / "rest")
     noise = mimu.allan(mimu.read(path))

@@ -2,9 +2,12 @@
 //!
 //! Between recordings a unit is switched off, so its biases change; this must not be taken for an effect.
 
+use mimu::calibration::Calibration;
 use mimu::diagnose::rejected::Reason;
 use mimu::diagnose::{Diagnosis, Recordings, Verdict, diagnose};
-use mimu::fit::Options;
+use mimu::diagnosed::diagnosed;
+use mimu::fit::{Options, fit};
+use mimu::judgement::JudgementKind;
 use mimu::prepared::Prepared;
 use mimu::signal::stillness::STILL_FACTOR;
 use mimu_recording::RawUnit;
@@ -145,6 +148,21 @@ fn a_chamber_that_only_cools_cannot_tell_temperature_from_time() {
     assert!(gyro.held_out_rms[1] < 0.2 * gyro.held_out_rms[0]);
     let told = gyro.notes.iter().any(|n| n.contains("only falls"));
     assert!(told, "{:?}", gyro.notes);
+}
+
+#[test]
+fn one_pose_with_a_given_matrix_tests_nothing_and_is_no_misfit() {
+    let file = bench::drawn(5, "one pose");
+    let poses = |count, seed| bench::recorded(&bench::hand_plan(count), &file, seed);
+    let fitted = fit(poses(24, 1), Options::default()).expect("a fit");
+    let given = Calibration::of(&fitted, &[], "2026-01-01T00:00:00Z").expect("a calibration");
+    let recordings = Recordings {
+        given: Some(&given),
+        ..poses(1, 2).into()
+    };
+    let found = diagnosed(recordings, [None, Some("given")], "", &|_| ()).expect("a diagnosis");
+    let judgement = found.result.judgement;
+    assert_eq!(judgement.kind, JudgementKind::Untested, "{judgement}");
 }
 
 #[test]

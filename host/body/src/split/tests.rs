@@ -266,6 +266,28 @@ fn turns_that_some_pairs_lack_are_left_to_the_others() {
     assert_eq!(split(&body), None);
 }
 
+#[test]
+fn turns_of_several_recordings_narrow_the_intervals_of_the_pairs_that_all_have() {
+    let of = Simulated {
+        common: 4e-3,
+        own: vec![1e-3; 4],
+        noise: 2e-4,
+        shared: 0.0,
+        by_roughness: false,
+    };
+    let mut bodies: Vec<_> = (0..6).map(|seed| of.body(seed)).collect();
+    bodies[3].pairs.remove(2);
+    let joined = TurnErrors::joined(&bodies).expect("recordings");
+    let [one, all] = [&bodies[0], &joined].map(|of| split(of).expect("pairs share turns"));
+    assert_eq!(all.turns, 6 * TURNS);
+    assert_eq!(all.own.keys().collect::<Vec<_>>(), [&1, &2, &4]);
+    let left = 1.0 - FITTED as f64 / (2 * TURNS) as f64;
+    let truth = of.common * left.sqrt();
+    assert!((all.common.lower..=all.common.upper).contains(&truth));
+    let width = |of: &Split| of.common.upper - of.common.lower;
+    assert!(width(&all) < 0.6 * width(&one));
+}
+
 /// A unit that is held in twelve poses and turned between them by hand, a bump of half a second; each axis reads it by its own scale factor.
 fn by_hand(mounted: &Matrix3<f64>, seed: u64) -> Samples {
     let mut random = Random(seed);
