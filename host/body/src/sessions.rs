@@ -91,6 +91,8 @@ fn combined(all: &[&FittedTriad]) -> Option<FittedTriad> {
         noise_floor: rms(|t| t.noise_floor),
         windows: all.iter().map(|t| t.windows).sum(),
         left_out: Vec::new(),
+        // What it adds from session to session is in the scatter of their offsets.
+        iron: None,
         judgement: Judgement::worst(all.iter().map(|t| t.judgement.clone()))?,
         ..first.clone()
     })

@@ -55,6 +55,7 @@ fn triad(name: &str, unit: &str, c: Matrix, o: [f64; 3]) -> BodyTriad {
         interval_delay_ms: None,
         lever_arm_mm: None,
         interval_lever_arm_mm: None,
+        iron: None,
     }
 }
 

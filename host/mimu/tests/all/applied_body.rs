@@ -34,6 +34,7 @@ pub fn turned(triad: &str, unit: &str) -> BodyTriad {
         interval_delay_ms: None,
         lever_arm_mm: None,
         interval_lever_arm_mm: None,
+        iron: None,
     }
 }
 
