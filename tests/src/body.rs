@@ -133,13 +133,15 @@ pub fn body(disturbance: Disturbance, bandwidth: Bandwidth, seed: u64) -> RigFil
     file
 }
 
-/// `file` with iron that gains so much field per kelvin, µT, in a direction by the seed, and a thermometer on the board that errs by its noise only.
+/// `file` with iron that gains so much field per kelvin, µT, in a direction by the seed, a small board that follows the air in 40 s, and a thermometer
+/// on it that errs by its noise only.
 pub fn warming(mut file: RigFile, ut_per_c: f64, seed: u64) -> RigFile {
     let way = Random::new(seed, "iron").attitude();
     let mags = file.triad.iter_mut().filter(|triad| triad.name == "mag");
     mags.for_each(|mag| mag.iron_ut_per_c = way.turn([ut_per_c, 0.0, 0.0]));
     file.unit.temperature = Some(TemperatureSensor::Board);
     file.unit.temperature_offset_c = Some(0.0);
+    file.thermal.board_lag_s = Some(40.0);
     file
 }
 

@@ -42,7 +42,7 @@ pub fn calibrated(samples: &Samples, rests: &[Range<usize>], gravity: f64) -> [A
     let up: Vec<Vector3<f64>> = still.iter().map(|u| accel.apply(u).normalize()).collect();
     // The bias is what the first rest reads.
     let bias = means(&samples.gyro)[0];
-    // Counts per rad/s by the longest turn, which K needs to begin with.
+    // K begins with the scale of the turns.
     let unit = scale_by_turns(samples, rests, &up, &bias);
     let gyro_of = |at: &DVector<f64>| {
         let t = Matrix3::new(1.0, -at[0], at[1], at[2], 1.0, -at[3], -at[4], at[5], 1.0);
@@ -69,7 +69,7 @@ fn model(t: &Matrix3<f64>, k: &Vector3<f64>, bias: &Vector3<f64>) -> Affine<f64>
     }
 }
 
-/// rad/s per raw unit by which the turns have the size that gravity shows, to a few percent: the least scale of several, by the same residual.
+/// rad/s per raw unit by which the turns have the size that gravity shows, to a tenth: the best scale of several, by the same residual.
 fn scale_by_turns(
     samples: &Samples,
     rests: &[Range<usize>],
@@ -84,10 +84,11 @@ fn scale_by_turns(
         });
         each.sum()
     };
-    // From a readings of 1e-5 rad/s to one of SI, in steps of 5 %.
-    let all = (0..260).map(|k| 1e-5 * 1.05f64.powi(k));
-    let found = all.min_by(|a, b| error(*a).total_cmp(&error(*b)));
-    found.expect("there are some")
+    // From readings of 1e-5 rad/s to those in SI, in steps of a fifth.
+    let all = (0..66).map(|k| 1e-5 * 1.2f64.powi(k));
+    let all = all.map(|unit| (unit, error(unit)));
+    let found = all.min_by(|a, b| a.1.total_cmp(&b.1));
+    found.expect("there are some").0
 }
 
 /// Rotation of the body from the first sample of a range to its last, by Runge and Kutta's fourth order (14) to (17), with the rate in the middle between two samples

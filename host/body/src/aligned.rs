@@ -102,7 +102,7 @@ impl Aligned {
             };
             Ok(Further {
                 name: of.triad,
-                series: standing.compensated(&raw, warmth.as_ref()),
+                series: standing.compensated(raw, warmth.as_ref()),
                 standing,
                 lost: 0,
                 is_placed: of.rotation_deg.is_some()

@@ -203,7 +203,7 @@ impl Field {
     ) -> Option<(Errors, [f64; 2])> {
         let raw = raw.without_repeats();
         let warm = warmth.zip(standing.iron.map(|(_, temp_c)| temp_c));
-        let sizes = standing.compensated(&raw, warmth).x.into_iter();
+        let sizes = standing.compensated(raw.clone(), warmth).x.into_iter();
         let size = size.unwrap_or(sizes.map(|x| x.norm()).sum::<f64>() / raw.len() as f64);
         let problem = Problem::new(raw, motion, &[], (size, 1e-9), warm)?;
         let all = vec![true; problem.pieces.count];

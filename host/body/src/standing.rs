@@ -36,7 +36,7 @@ impl From<&BodyTriad> for Standing {
 
 impl Standing {
     /// What raw readings are in the frame of the reference. Where no temperature is known, iron does not move.
-    pub fn compensated(&self, raw: &Series, warmth: Option<&Warmth>) -> Series {
+    pub fn compensated(&self, raw: Series, warmth: Option<&Warmth>) -> Series {
         let mut all = raw.map(|u| self.calibration.apply(u));
         if let Some(((per_k, temp_c), warmth)) = self.iron.zip(warmth) {
             let warmer = all.t.iter().map(|t| warmth.at(*t) - temp_c);
