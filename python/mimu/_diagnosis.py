@@ -151,6 +151,7 @@ def diagnose(
     noise: NoiseLike | None = None,
     whole_turns: int | bool = False,
     placement: float | None = None,
+    field: float | None = None,
 ) -> Diagnosis:
     """Finds the effect behind the residual of a unit, as ``mimu diagnose`` does.
 
@@ -162,7 +163,7 @@ def diagnose(
     others = [] if verify is None else several(verify, "verify")
     if len(others) > 1:
         raise Error.of("verify", "a diagnosis is judged by one other recording", "judge its calibration by more with mimu.verify")
-    options = dict(still=still, steps=steps, keep=kept(keep), whole_turns=whole_turns, placement=placement)
+    options = dict(still=still, steps=steps, keep=kept(keep), whole_turns=whole_turns, placement=placement, field=field)
     return Diagnosis(
         _mimu.diagnose(
             several(recordings), arguments(options), verify=others[0] if others else None,

@@ -100,7 +100,7 @@ pub(crate) fn diagnose(
         let split = args.split(&samples, &mut recordings)?;
         let given = given.as_ref().map(|(_, name)| name.as_str());
         let found = diagnosed(recordings, [name.as_deref(), given], &now, &|_| ())?;
-        let further = Further::of(Some(samples[0]), &found, split)?;
+        let further = Further::of(Some(samples[0]), &found, split, &args)?;
         Ok((found, further))
     };
     let (done, further) = done(py, work, refused)?;

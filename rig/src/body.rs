@@ -1,6 +1,6 @@
 //! Triads on the board beyond the first gyro and accelerometer: a magnetometer, a second unit. Each has a place, an attitude and a delay.
 //!
-//! They have noise and low-passes as the first two, but no effects, and the temperature does not change them. Their supplies and converters are ideal.
+//! They have noise and low-passes as the first two, but no effects. The temperature changes only the iron of a magnetometer. Their supplies and converters are ideal.
 
 use serde::{Deserialize, Serialize};
 
@@ -45,7 +45,12 @@ pub struct FurtherTruth {
     pub between: Between,
     /// Quantisation, raw; 0: none.
     pub step_raw: f64,
+    /// Field of iron on the board, per kelvin of the board above [`IRON_C`], triad's axes, µT/K.
+    pub iron_per_c: Vector,
 }
+
+/// Temperature at which the nulls contain all iron, °C.
+pub const IRON_C: f64 = 25.0;
 
 /// A further triad as calibrations describe it, relative to the first gyro or accelerometer.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -58,11 +63,13 @@ pub struct Relation {
     pub delay_ms: f64,
     /// From the first accelerometer, in its frame, mm.
     pub lever_mm: Vector,
+    /// By how much its iron reads more per kelvin, in its own frame, µT/K.
+    pub iron_per_c: Vector,
 }
 
 impl FurtherTruth {
-    /// The input of its sensors, triad's axes.
-    fn input(&self, motion: &Motion, field: &FieldTruth) -> Vector {
+    /// The input of its sensors, triad's axes; the board is at `board_c`.
+    fn input(&self, motion: &Motion, field: &FieldTruth, board_c: f64) -> Vector {
         let lever = self.lever;
         let body = match self.kind {
             MeasuredQuantity::Gyro => motion.rate,
@@ -77,7 +84,8 @@ impl FurtherTruth {
                 motion.attitude.inverse().turn(level)
             }
         };
-        self.rotation.inverse().turn(body)
+        let iron = scale(board_c - IRON_C, self.iron_per_c);
+        add(self.rotation.inverse().turn(body), iron)
     }
 
     /// Its calibration; `None` if its sensitive directions do not span space.
@@ -100,6 +108,7 @@ impl FurtherTruth {
             rotation_deg: scale(angle.to_degrees(), axis),
             delay_ms: 1e3 * (self.delay_s + self.triad.lag_s() - reference.lag_s()),
             lever_mm: scale(1e3, body.inverse().turn(self.lever)),
+            iron_per_c: own.inverse().turn(self.iron_per_c),
         })
     }
 }
@@ -144,12 +153,17 @@ impl Further {
         }
     }
 
-    /// Cells of the next row, which is at `t_s`, raw: NaN if they are empty. Before the recording the board is as in its beginning.
-    pub(crate) fn read(&mut self, t_s: f64, flaws: &Flaws, field: &FieldTruth) -> Vector {
+    /// Cells of the next row, which is at `t_s`, with the board at `board_c`, raw: NaN if they are empty. Before the recording the board is as in its beginning.
+    pub(crate) fn read(
+        &mut self,
+        (t_s, board_c): (f64, f64),
+        flaws: &Flaws,
+        field: &FieldTruth,
+    ) -> Vector {
         let truth = &self.truth;
         let mut instant = self.carrier.at((t_s - truth.delay_s).max(0.0));
         flaws.sway(&mut instant);
-        let input = truth.input(&instant.motion, field);
+        let input = truth.input(&instant.motion, field, board_c);
         // The low-passes run in every row: between the samples of a slow triad the input is far from linear.
         let output: Vector = std::array::from_fn(|i| {
             let axis = &mut self.axes[i];

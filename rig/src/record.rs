@@ -124,7 +124,8 @@ impl Run<'_> {
         let mut readings = self.converter.read(&pins);
         readings.temp_c = self.flaws.thermometer(t_s, readings.temp_c);
         let further = self.further.iter_mut();
-        let further = further.map(|triad| triad.read(t_s, &self.flaws, &self.field));
+        let at = (t_s, self.unit.board_c());
+        let further = further.map(|triad| triad.read(at, &self.flaws, &self.field));
         Row {
             instant,
             stamp_s,

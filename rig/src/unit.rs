@@ -142,6 +142,7 @@ pub struct Unit {
     gyro: [Axis; 3],
     accel: [Axis; 3],
     thermal: Thermal,
+    board_c: f64,
     supply: Voltage,
     converter_reference: Voltage,
     temperature: TemperatureTruth,
@@ -172,6 +173,7 @@ impl Unit {
             gyro: triad(&truth.gyro, "gyro"),
             accel: triad(&truth.accel, "accel"),
             thermal: Thermal::new(&truth.thermal, dt_s),
+            board_c: f64::NAN,
             supply: Voltage::new(truth.supply, "supply", seed),
             converter_reference: Voltage::new(
                 truth.converter_reference,
@@ -197,6 +199,7 @@ impl Unit {
     /// Voltages after the next step, for the motion and the chamber's air at that time. The first call returns those at the start.
     pub fn step(&mut self, motion: &Motion, chamber_c: f64) -> Pins {
         let temperatures = self.thermal.step(chamber_c);
+        self.board_c = temperatures.board;
         let at = Condition {
             motion,
             gyro: self.gyro.each_ref().map(|a| a.sensed(motion.rate)),
@@ -246,6 +249,11 @@ impl Unit {
             effect.read_out(&at, &mut pins);
         }
         pins
+    }
+
+    /// Temperature of the board after the last step, °C.
+    pub(crate) fn board_c(&self) -> f64 {
+        self.board_c
     }
 }
 

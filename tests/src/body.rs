@@ -11,7 +11,7 @@ use mimu::signal::stillness::STILL_FACTOR;
 use mimu::triad::Estimate;
 use mimu_body::{Body, FittedTriad};
 use mimu_recording::{Recording, TriadKind, TriadName};
-use mimu_rig::body::{Between, Relation};
+use mimu_rig::body::{Between, IRON_C, Relation};
 use mimu_rig::field::{FieldTruth, MagnetTruth};
 use mimu_rig::located::Source;
 use mimu_rig::plan::Plan;
@@ -19,6 +19,7 @@ use mimu_rig::random::Random;
 use mimu_rig::record::samples;
 use mimu_rig::rig_file::{AxesFile, RigFile, RigTruth, TriadFile};
 use mimu_rig::rotation::{Vector, norm, scale};
+use mimu_rig::unit::TemperatureSensor;
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
@@ -114,6 +115,7 @@ pub fn body(disturbance: Disturbance, bandwidth: Bandwidth, seed: u64) -> RigFil
             every: 1,
             between: Between::Empty,
             step_raw: None,
+            iron_ut_per_c: [0.0; 3],
             axes: AxesFile::default(),
             affine: None,
         });
@@ -129,6 +131,27 @@ pub fn body(disturbance: Disturbance, bandwidth: Bandwidth, seed: u64) -> RigFil
         magnet: disturbance.magnet(&mut random).into_iter().collect(),
     });
     file
+}
+
+/// `file` with iron that gains so much field per kelvin, µT, in a direction by the seed, a small board that follows the air in 40 s, and a thermometer
+/// on it that errs by its noise only.
+pub fn warming(mut file: RigFile, ut_per_c: f64, seed: u64) -> RigFile {
+    let way = Random::new(seed, "iron").attitude();
+    let mags = file.triad.iter_mut().filter(|triad| triad.name == "mag");
+    mags.for_each(|mag| mag.iron_ut_per_c = way.turn([ut_per_c, 0.0, 0.0]));
+    file.unit.temperature = Some(TemperatureSensor::Board);
+    file.unit.temperature_offset_c = Some(0.0);
+    file.thermal.board_lag_s = Some(40.0);
+    file
+}
+
+/// [`plan`] while the air warms from 20 °C to 32, and by every third seed cools again.
+pub fn warming_plan(seed: u64) -> String {
+    let air = match seed % 3 {
+        0 => "chamber_c = [[0.0, 20.0], [80.0, 32.0], [160.0, 22.0]]\n",
+        _ => "chamber_c = [[0.0, 20.0], [120.0, 32.0]]\n",
+    };
+    plan(seed).replacen("[[step]]", &format!("{air}[[step]]"), 1)
 }
 
 /// A session by hand as [`by_hand::plan`]; every other one tumbles for half a minute after its poses.
@@ -209,7 +232,14 @@ fn errors(found: &FittedTriad, truth: &Relation, wander: Vector, dip_deg: f64) -
         });
     };
     let c = Matrix3::from_fn(|i, j| truth.inverse.matrix[i][j]);
-    let o = Vector3::from(truth.inverse.offset) - c * Vector3::from(wander);
+    let mut o = Vector3::from(truth.inverse.offset) - c * Vector3::from(wander);
+    let iron = Vector3::from(truth.iron_per_c);
+    for (estimate, truth) in found.iron.iter().flat_map(|of| of.per_k).zip(&iron) {
+        add("iron, µT/K", &estimate, *truth, 1.0);
+    }
+    o -= found
+        .iron
+        .map_or(Vector3::zeros(), |of| iron * (of.temp_c - IRON_C));
     let estimates = found.triad.inverse_estimates();
     for i in 0..3 {
         add(
@@ -257,10 +287,9 @@ fn errors(found: &FittedTriad, truth: &Relation, wander: Vector, dip_deg: f64) -
     all
 }
 
-/// Records and fits a body in the session of this seed.
-pub fn case(file: &RigFile, seed: u64) -> Vec<Found> {
-    let plan = plan(seed);
-    let folder = bench::written(&plan, file, seed);
+/// Records and fits a body in a session.
+pub fn case(file: &RigFile, plan: &str, seed: u64) -> Vec<Found> {
+    let folder = bench::written(plan, file, seed);
     let recording = Recording::open(&folder.path().join("recording")).expect("a recording");
     let prepared = Prepared::read(&recording, STILL_FACTOR, |_| ()).expect("readable");
     let unit = fit(prepared, Options::IN_SAMPLE).unwrap_or_else(|e| panic!("seed {seed}: {e}"));
@@ -271,12 +300,14 @@ pub fn case(file: &RigFile, seed: u64) -> Vec<Found> {
     let body = Body::of(&recording, &unit, &options)
         .expect("readable")
         .expect("further triads");
-    let wander = wander(&plan, file, seed);
+    found(body, &truth, &wander(plan, file, seed))
+}
+
+/// What was found of the triads of a body, against their truth. Their readings are off by `wander`, raw.
+pub(crate) fn found(body: Body, truth: &RigTruth, wander: &[Vector]) -> Vec<Found> {
     let fitted = body.triads.iter().map(|triad| {
-        let k = file
-            .triad
-            .iter()
-            .position(|t| t.name == triad.name.to_string());
+        let mut names = truth.further.iter().map(|of| &of.name);
+        let k = names.position(|name| *name == triad.name.to_string());
         let k = k.expect("of the body");
         let relation = truth.further[k].relation(&truth.unit).expect("regular");
         let open = [
@@ -305,8 +336,20 @@ pub fn case(file: &RigFile, seed: u64) -> Vec<Found> {
 pub fn cases(disturbance: Disturbance, bandwidth: Bandwidth, bodies: u64) -> Vec<Vec<Found>> {
     (0..bodies)
         .into_par_iter()
-        .map(|seed| case(&body(disturbance, bandwidth, seed), seed))
+        .map(|seed| case(&body(disturbance, bandwidth, seed), &plan(seed), seed))
         .collect()
+}
+
+/// The magnetometers of the first so many bodies in a session that warms, with iron that gains so much field per kelvin, µT.
+pub fn warmed(ut_per_c: f64, bandwidth: Bandwidth, bodies: u64) -> Vec<Vec<Found>> {
+    let mag = |found: &Found| found.name == TriadName::MAG;
+    let one = |seed| {
+        let mut file = warming(body(Disturbance::None, bandwidth, seed), ut_per_c, seed);
+        file.triad.retain(|triad| triad.name == "mag");
+        let found = case(&file, &warming_plan(seed), seed).into_iter();
+        found.filter(mag).collect()
+    };
+    (0..bodies).into_par_iter().map(one).collect()
 }
 
 /// Errors of the parameters of one kind.

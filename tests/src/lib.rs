@@ -13,6 +13,7 @@
 //! | [`coverage`]           | how often intervals contain the truth, from recording to fit      |
 //! | [`earth`]              | the Earth's rate in the biases of gyros on a table                |
 //! | [`recordings`]         | recordings by other people                                        |
+//! | [`imu_tk`]             | the method of another program, to compare with                    |
 //! | [`planted`]            | effects of the bench, planted in them                             |
 //! | [`body`]                         | bodies of several triads by hand                                   |
 //! | [`noise_in_use`], [`flight`] | noise in motion of units that are wrong in a known way, by rests and by a trajectory |
@@ -29,11 +30,13 @@
 pub mod bench;
 pub mod blind;
 pub mod body;
+pub mod body_sessions;
 pub mod by_hand;
 pub mod coverage;
 pub mod earth;
 pub mod fleet;
 pub mod flight;
+pub mod imu_tk;
 pub mod judged;
 pub mod niu;
 pub mod noise_in_use;

@@ -8,7 +8,9 @@ use mimu::signal::stillness::STILL_FACTOR;
 use mimu::triad::half_width_95;
 use mimu_core::compensation::Affine;
 use mimu_recording::error::Result;
-use mimu_recording::{ImportOptions, LogOptions, RawUnit, Recording, Reference, import};
+use mimu_recording::{
+    Column, ImportOptions, LogOptions, RawUnit, Recording, Reference, TriadName, import,
+};
 use nalgebra::{DMatrix, DVector, Matrix3, UnitQuaternion, Vector3};
 use tempfile::TempDir;
 
@@ -71,6 +73,30 @@ impl Foreign<'_> {
             println!("import warns: {warning}");
         }
         Recording::open(&out)
+    }
+
+    /// Its halves of time, as two recordings, with their samples.
+    pub fn halves(&self) -> [(Prepared, Samples); 2] {
+        let half = |second: bool| {
+            let folder = TempDir::new().expect("there is a temporary folder");
+            let files = self.files.iter().map(|(file, columns)| {
+                let text = std::fs::read_to_string(file).expect("the file was there a moment ago");
+                let lines: Vec<&str> = text.lines().collect();
+                let (first, last) = lines.split_at(lines.len() / 2);
+                let part = folder.path().join(file.file_name().expect("a file"));
+                std::fs::write(&part, if second { last } else { first }.join("\n"))
+                    .expect("written");
+                (part, *columns)
+            });
+            let foreign = Foreign {
+                files: files.collect(),
+                ..self.clone()
+            };
+            let recording = foreign.import(&folder).expect("importable");
+            let prepared = Prepared::read(&recording, STILL_FACTOR, |_| ()).expect("readable");
+            (prepared, Samples::of(&recording))
+        };
+        [false, true].map(half)
     }
 
     /// Imports it, finds its dwells and fits it; four blocks are held out in turn.
@@ -268,6 +294,22 @@ pub fn dwell_rows(fit: &Fit) -> Vec<std::ops::Range<usize>> {
 }
 
 impl Samples {
+    /// Of a recording.
+    pub fn of(recording: &Recording) -> Self {
+        let triad = |name: TriadName| -> Vec<Vector3<f64>> {
+            let columns = [0, 1, 2].map(|axis| Column::of(name, axis));
+            let all = recording.read_columns(&columns, |_| ()).expect("readable");
+            let rows = (0..all[0].len()).map(|k| Vector3::new(all[0][k], all[1][k], all[2][k]));
+            rows.collect()
+        };
+        let times = recording.read_columns(&[Column::Time], |_| ());
+        Self {
+            t_s: times.expect("readable").remove(0),
+            gyro: triad(TriadName::GYRO),
+            accel: triad(TriadName::ACCEL),
+        }
+    }
+
     /// Rotation of the body from one sample to another: a chain of quaternions with the mean rate of neighbouring samples. It transforms a vector
     /// from the frame at `to` into that at `from`.
     pub fn rotation(&self, gyro: &Affine<f64>, from: usize, to: usize) -> UnitQuaternion<f64> {

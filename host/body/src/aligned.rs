@@ -15,6 +15,7 @@ use nalgebra::Vector3;
 use serde::Serialize;
 
 use crate::carrier::read;
+use crate::iron::Warmth;
 use crate::series::Series;
 use crate::standing::Standing;
 
@@ -89,6 +90,7 @@ impl Aligned {
     /// The samples cannot be read; a mean needs a second gyro or accelerometer.
     pub fn of(recording: &Recording, calibration: &Calibration, mean: bool) -> Result<Self> {
         let there = recording.triads();
+        let warmth = Warmth::read(recording)?;
         let own = calibration.body.iter();
         let own = own.filter(|of| there.contains(&of.triad));
         let further = |of: &BodyTriad| {
@@ -100,7 +102,7 @@ impl Aligned {
             };
             Ok(Further {
                 name: of.triad,
-                series: raw.map(|u| standing.calibration.apply(u)),
+                series: standing.compensated(raw, warmth.as_ref()),
                 standing,
                 lost: 0,
                 is_placed: of.rotation_deg.is_some()
@@ -130,7 +132,7 @@ impl Aligned {
         for of in self
             .triads
             .iter_mut()
-            .filter(|of| of.standing.delay_s != 0.0)
+            .filter(|of| of.standing.delay_s != 0.0 || of.standing.iron.is_some())
         {
             of.shift(batch);
         }

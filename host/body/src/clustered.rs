@@ -4,6 +4,8 @@
 //! samples would be too small by factors. Here it comes from leaving out one cluster after the other (the jackknife, one Gauss-Newton step each): it asks only
 //! that clusters are independent, and gives the error of each cluster by a fit without it for nothing.
 
+use std::ops::Range;
+
 use nalgebra::{DMatrix, DVector};
 
 /// Sums over the residuals of a piece of time.
@@ -13,6 +15,18 @@ struct Cluster {
     gradient: DVector<f64>,
     squares: f64,
     rows: f64,
+}
+
+impl Cluster {
+    /// Without residuals, by so many parameters.
+    fn empty(n: usize) -> Self {
+        Self {
+            normal: DMatrix::zeros(n, n),
+            gradient: DVector::zeros(n),
+            squares: 0.0,
+            rows: 0.0,
+        }
+    }
 }
 
 /// Normal equations, cluster by cluster. Residuals are observed less modelled, derivatives those of the model.
@@ -55,15 +69,7 @@ impl Clusters {
         let n = at.len();
         let precision = known.map(|sigma| sigma.powi(-2));
         Self {
-            list: vec![
-                Cluster {
-                    normal: DMatrix::zeros(n, n),
-                    gradient: DVector::zeros(n),
-                    squares: 0.0,
-                    rows: 0.0,
-                };
-                count
-            ],
+            list: vec![Cluster::empty(n); count],
             pull: -precision.component_mul(at),
             known: precision,
         }
@@ -86,6 +92,36 @@ impl Clusters {
     /// Adds to the gradient of a cluster what noise of the regressors takes from it.
     pub fn correct(&mut self, cluster: usize, by: &DVector<f64>) {
         self.list[cluster].gradient += by;
+    }
+
+    /// The same with clusters joined to `count`: `into` gives the number of each, or leaves it out.
+    pub fn joined(&self, count: usize, into: impl Fn(usize) -> Option<usize>) -> Self {
+        let mut joined = Self {
+            list: vec![Cluster::empty(self.known.len()); count],
+            known: self.known.clone(),
+            pull: self.pull.clone(),
+        };
+        for (g, of) in self.list.iter().enumerate() {
+            let Some(own) = into(g).and_then(|k| joined.list.get_mut(k)) else {
+                continue;
+            };
+            own.normal += &of.normal;
+            own.gradient += &of.gradient;
+            own.squares += of.squares;
+            own.rows += of.rows;
+        }
+        joined
+    }
+
+    /// The same with some parameters, which are now at `at`, known to be zero.
+    pub fn without(&self, parameters: Range<usize>, at: &DVector<f64>) -> Self {
+        let mut held = self.clone();
+        for k in parameters {
+            let seen: f64 = self.list.iter().map(|of| of.normal[(k, k)]).sum();
+            held.known[k] = HELD * seen;
+            held.pull[k] = -held.known[k] * at[k];
+        }
+        held
     }
 
     /// Solves for the clusters that are `used`; `None` if they do not determine the parameters.
@@ -167,6 +203,8 @@ fn jackknife(
     (covariance, dof)
 }
 
+/// Precision of a parameter that is known, in that by which the data show it.
+const HELD: f64 = 1e9;
 /// Smallest eigenvalue of the matrix with a unit diagonal that is inverted. Rounding leaves 1e-16 of it.
 const SINGULAR: f64 = 1e-11;
 

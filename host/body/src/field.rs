@@ -5,14 +5,17 @@
 //! gravity is one constant, the dip. An ellipsoid alone, the usual calibration, is the first of these: it leaves a rotation open, and a field that differs by place bends it
 //! unnoticed, where the turns contradict it.
 
+use std::ops::Range;
+
 use mimu::triad::{Estimate, affine};
 use mimu_core::compensation::Affine;
-use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, SMatrix, SVector, Vector3};
 
 use crate::carrier::Rest;
 use crate::clustered::Clusters;
 use crate::errors::Errors;
 use crate::fitted::Known;
+use crate::iron::{Iron, Warmth, is_there};
 use crate::pieces::{Groups, Pieces, joined};
 use crate::relation::{DELAY, Equations, Relation};
 use crate::series::{Motion, Series};
@@ -35,10 +38,11 @@ pub(crate) const FEWEST_RESTS: usize = 6;
 /// How often rests that the others contradict are looked for.
 const ROUNDS: usize = 3;
 
-/// The parameters behind the delay: sine of the dip, and what remains of the gyro's bias (rad/s).
+/// The parameters behind the delay: sine of the dip, what remains of the gyro's bias (rad/s), and where it is tried how iron moves with the temperature.
 const DIP: usize = 13;
 const BIAS: usize = 14;
 const COUNT: usize = 17;
+const IRON: Range<usize> = COUNT..COUNT + 3;
 /// Groups of residuals.
 const TURNS: usize = 0;
 const SIZES: usize = 1;
@@ -60,6 +64,8 @@ pub(crate) struct Field {
     pub worst_rad: f64,
     /// Errors at all rests: of its size, and of its part along up.
     pub at_rest: [Vec<f64>; 2],
+    /// The temperature for which the offset is, °C, if iron that moves with it was tried.
+    temp_c: Option<f64>,
 }
 
 /// Time in which the rest contradicts the field.
@@ -82,28 +88,87 @@ struct Problem<'a> {
     /// Pairs of samples that a turn lies between.
     pairs: Vec<[usize; 2]>,
     /// Mean readings at rests.
-    rests: Vec<(Vector3<f64>, Rest)>,
+    rests: Vec<(Reading, Rest)>,
     pieces: Pieces,
     size: f64,
     /// Standard deviation of what remains of the gyro's bias, rad/s.
     bias: f64,
     /// Variance of a raw reading by white noise.
     noise: f64,
+    /// How much warmer than [`Field::temp_c`] each sample is, K; `None` where iron does not move.
+    warmer: Option<Vec<f64>>,
 }
 
+/// A raw reading, and how much warmer than [`Field::temp_c`] it was, K.
+struct Reading {
+    u: Vector3<f64>,
+    warmer: f64,
+}
+
+/// What a magnetometer's readings are made of.
+struct Model {
+    calibration: Affine<f64>,
+    /// By how much the field of iron grows per kelvin.
+    iron: Vector3<f64>,
+}
+
+impl Model {
+    fn of(at: &DVector<f64>) -> Self {
+        let mut iron = Vector3::zeros();
+        if at.len() > COUNT {
+            iron = at.fixed_rows::<3>(IRON.start).into_owned();
+        }
+        Self {
+            calibration: affine(&at.fixed_rows::<12>(0).into_owned()),
+            iron,
+        }
+    }
+
+    /// The field of a reading.
+    fn apply(&self, of: &Reading) -> Vector3<f64> {
+        self.calibration.apply(&of.u) - self.iron * of.warmer
+    }
+}
+
+impl Reading {
+    /// Derivatives of the field of this reading along `to` by so many parameters.
+    fn along(&self, to: &Vector3<f64>, count: usize) -> DVector<f64> {
+        let mut by = DVector::zeros(count);
+        by.fixed_rows_mut::<12>(0)
+            .copy_from(&(by_calibration(&self.u).transpose() * to));
+        if count > COUNT {
+            by.fixed_rows_mut::<3>(IRON.start)
+                .copy_from(&(to * -self.warmer));
+        }
+        by
+    }
+}
+
+/// A temperature, and the one for which the offset is, °C.
+type Warm<'a> = Option<(&'a Warmth, f64)>;
+
 impl Field {
-    /// Of raw readings. `size`: that of the field, in the unit of the result; `bias`: standard deviation of what remains of the gyro's, rad/s. `None` if too
-    /// little of it turns.
-    pub fn of(raw: &Series, motion: &Motion, rests: &[Rest], size: f64, bias: f64) -> Option<Self> {
+    /// Of raw readings. `size`: that of the field, in the unit of the result; `bias`: standard deviation of what remains of the gyro's, rad/s; with `warm`, iron moves with the
+    /// temperature. `None` if too little of it turns.
+    pub fn of(
+        raw: &Series,
+        motion: &Motion,
+        rests: &[Rest],
+        (size, bias): (f64, f64),
+        warm: Warm,
+    ) -> Option<Self> {
         let mut left: Vec<[f64; 2]> = Vec::new();
         for round in 0.. {
-            let problem = Problem::new(raw.without(&left), motion, rests, size, bias)?;
+            let problem = Problem::new(raw.without(&left), motion, rests, (size, bias), warm)?;
             let relation = Relation::of(&problem, problem.start()?)?;
             let more = problem.contradicted(&relation);
             if more.is_empty() || round == ROUNDS {
-                let all = Problem::new(raw.clone(), motion, rests, size, bias)?;
+                let all = Problem::new(raw.clone(), motion, rests, (size, bias), warm)?;
                 let left_out = all.left_out(&relation, left);
-                return problem.field(relation, left_out);
+                let field = problem.field(relation, left_out)?;
+                let temp_c = warm.map(|(_, temp_c)| temp_c);
+                return (warm.is_none() || problem.iron_is_there(&field))
+                    .then_some(Self { temp_c, ..field });
             }
             left.extend(more.iter().map(Rest::span));
         }
@@ -128,6 +193,12 @@ impl Field {
         })
     }
 
+    /// How its iron moves with the temperature, if it does; `rotation` leads from its own frame to that of the gyro.
+    pub fn iron(&self, rotation: &Rotation3<f64>) -> Option<Iron> {
+        let found = (&self.relation.at, &self.relation.solution, IRON.start);
+        Some(Iron::of(found, rotation, self.temp_c?))
+    }
+
     /// Errors of a magnetometer that stands so; the rms error of the size of the field, and that size: `size`, or else the mean that it reads. `None` if nothing
     /// turns.
     pub fn errors(
@@ -135,14 +206,20 @@ impl Field {
         motion: &Motion,
         standing: &Standing,
         size: Option<f64>,
+        warmth: Option<&Warmth>,
     ) -> Option<(Errors, [f64; 2])> {
         let raw = raw.without_repeats();
-        let sizes = raw.x.iter().map(|u| standing.calibration.apply(u).norm());
-        let size = size.unwrap_or(sizes.sum::<f64>() / raw.len() as f64);
-        let problem = Problem::new(raw, motion, &[], size, 1e-9)?;
+        let warm = warmth.zip(standing.iron.map(|(_, temp_c)| temp_c));
+        let sizes = standing.compensated(raw.clone(), warmth).x.into_iter();
+        let size = size.unwrap_or(sizes.map(|x| x.norm()).sum::<f64>() / raw.len() as f64);
+        let problem = Problem::new(raw, motion, &[], (size, 1e-9), warm)?;
         let all = vec![true; problem.pieces.count];
-        let errors = problem.errors(&standing.parameters(COUNT), &all)?;
-        let size_rms = problem.size_rms(&standing.calibration, |_| true);
+        let mut at = standing.parameters(problem.count());
+        if let Some((per_k, _)) = standing.iron.filter(|_| warm.is_some()) {
+            at.fixed_rows_mut::<3>(IRON.start).copy_from(&per_k);
+        }
+        let errors = problem.errors(&at, &all)?;
+        let size_rms = problem.size_rms(&at, |_| true);
         Some((errors, [size_rms, size]))
     }
 }
@@ -166,7 +243,13 @@ pub(crate) fn by_calibration(u: &Vector3<f64>) -> SMatrix<f64, 3, 12> {
 }
 
 impl<'a> Problem<'a> {
-    fn new(raw: Series, motion: &'a Motion, rests: &[Rest], size: f64, bias: f64) -> Option<Self> {
+    fn new(
+        raw: Series,
+        motion: &'a Motion,
+        rests: &[Rest],
+        (size, bias): (f64, f64),
+        warm: Warm,
+    ) -> Option<Self> {
         let pieces = Pieces::over(&raw.t)?;
         let mut used: Vec<usize> = Vec::new();
         for (k, t) in raw.t.iter().enumerate() {
@@ -189,11 +272,16 @@ impl<'a> Problem<'a> {
         let mean = |rest: &Rest| {
             let own = raw.x.get(raw.within(rest.span()))?;
             let own = Some(own).filter(|own| !own.is_empty())?;
-            Some((own.iter().sum::<Vector3<f64>>() / own.len() as f64, *rest))
+            let u = own.iter().sum::<Vector3<f64>>() / own.len() as f64;
+            let warmer = warm.map_or(0.0, |(of, temp_c)| of.at(rest.middle()) - temp_c);
+            Some((Reading { u, warmer }, *rest))
         };
+        let warmer =
+            |(of, temp_c): (&Warmth, f64)| raw.t.iter().map(|t| of.at(*t) - temp_c).collect();
         Some(Self {
             rests: rests.iter().filter_map(mean).collect(),
             noise: raw.noise(),
+            warmer: warm.map(warmer),
             bias,
             motion,
             used,
@@ -202,6 +290,26 @@ impl<'a> Problem<'a> {
             size,
             raw,
         })
+    }
+
+    /// Number of parameters.
+    fn count(&self) -> usize {
+        self.warmer.as_ref().map_or(COUNT, |_| IRON.end)
+    }
+
+    fn reading(&self, k: usize) -> Reading {
+        Reading {
+            u: self.raw.x[k],
+            warmer: self.warmer.as_ref().map_or(0.0, |all| all[k]),
+        }
+    }
+
+    fn iron_is_there(&self, field: &Field) -> bool {
+        let Relation {
+            at, solution, used, ..
+        } = &field.relation;
+        let clusters = self.clusters(at, &mut field.relation.groups.clone(), used);
+        is_there(&clusters, (at, solution, IRON), used).unwrap_or(false)
     }
 
     /// C and o by the turns alone, which are linear in them but for a common factor; sizes give it. The axes are taken to be right-handed: turns and sizes
@@ -237,7 +345,7 @@ impl<'a> Problem<'a> {
         let factor = self.size / (sizes.sum::<f64>() / count) * found.matrix.determinant().signum();
         let matrix = found.matrix * factor / scale;
         let offset = found.offset * factor - matrix * mean;
-        let mut at = DVector::zeros(COUNT);
+        let mut at = DVector::zeros(self.count());
         for k in 0..9 {
             at[k] = matrix[(k / 3, k % 3)];
         }
@@ -246,7 +354,7 @@ impl<'a> Problem<'a> {
         let sines = self
             .rests
             .iter()
-            .map(|(u, rest)| -rest.up.dot(&calibration.apply(u)) / self.size);
+            .map(|(of, rest)| -rest.up.dot(&calibration.apply(&of.u)) / self.size);
         at[DIP] = sines.sum::<f64>() / self.rests.len().max(1) as f64;
         at.iter().all(|x| x.is_finite()).then_some(at)
     }
@@ -257,7 +365,7 @@ impl<'a> Problem<'a> {
         [from, to]: [usize; 2],
         at: &DVector<f64>,
     ) -> Option<(Vector3<f64>, DMatrix<f64>)> {
-        let calibration = affine(&at.fixed_rows::<12>(0).into_owned());
+        let model = Model::of(at);
         let between = |delay: f64| {
             let turn = self
                 .motion
@@ -268,10 +376,15 @@ impl<'a> Problem<'a> {
         let whole = self.motion.turn(t0, t1)?;
         let turn: Matrix3<f64> = *whole.to_rotation_matrix().matrix();
         let later = between(at[DELAY] + DELAY_STEP_S)? - between(at[DELAY] - DELAY_STEP_S)?;
-        let [x0, x1] = [from, to].map(|k| calibration.apply(&self.raw.x[k]));
-        let mut by = DMatrix::zeros(3, COUNT);
-        let by_own = by_calibration(&self.raw.x[to]) - turn * by_calibration(&self.raw.x[from]);
+        let [of0, of1] = [from, to].map(|k| self.reading(k));
+        let [x0, x1] = [&of0, &of1].map(|of| model.apply(of));
+        let mut by = DMatrix::zeros(3, at.len());
+        let by_own = by_calibration(&of1.u) - turn * by_calibration(&of0.u);
         by.fixed_view_mut::<3, 12>(0, 0).copy_from(&by_own);
+        if at.len() > COUNT {
+            let by_iron = turn * of0.warmer - Matrix3::identity() * of1.warmer;
+            by.fixed_view_mut::<3, 3>(0, IRON.start).copy_from(&by_iron);
+        }
         by.column_mut(DELAY)
             .copy_from(&(-(later * x0) / (2.0 * DELAY_STEP_S)));
         // A rate that reads more has turned the field back too far: by the bias, as seen from the middle of the turn.
@@ -284,9 +397,10 @@ impl<'a> Problem<'a> {
     }
 
     /// Rms error of the size of the field in the samples for which `of` holds.
-    fn size_rms(&self, calibration: &Affine<f64>, of: impl Fn(usize) -> bool) -> f64 {
+    fn size_rms(&self, at: &DVector<f64>, of: impl Fn(usize) -> bool) -> f64 {
+        let model = Model::of(at);
         let own = self.used.iter().filter(|k| of(**k));
-        let errors = own.map(|k| calibration.apply(&self.raw.x[*k]).norm() - self.size);
+        let errors = own.map(|k| model.apply(&self.reading(*k)).norm() - self.size);
         mimu_recording::statistics::root_mean_square(errors)
     }
 
@@ -314,26 +428,26 @@ impl<'a> Problem<'a> {
     }
 
     /// Errors at these rests: of the size of the field, and of its part along up.
-    fn errors_at(&self, rests: &[&(Vector3<f64>, Rest)], relation: &Relation) -> [Vec<f64>; 2] {
-        let calibration = relation.calibration();
-        let size = |u: &Vector3<f64>| calibration.apply(u).norm() - self.size;
-        let dip = |u, rest| self.dip(&calibration, u, rest, relation.at[DIP]);
+    fn errors_at(&self, rests: &[&(Reading, Rest)], relation: &Relation) -> [Vec<f64>; 2] {
+        let model = Model::of(&relation.at);
+        let size = |of: &Reading| model.apply(of).norm() - self.size;
+        let dip = |of, rest| self.dip(&model, of, rest, relation.at[DIP]);
         [
-            rests.iter().map(|(u, _)| size(u)).collect(),
-            rests.iter().map(|(u, rest)| dip(u, rest)).collect(),
+            rests.iter().map(|(of, _)| size(of)).collect(),
+            rests.iter().map(|(of, rest)| dip(of, rest)).collect(),
         ]
     }
 
     /// By how much the field along up differs from that of its dip.
-    fn dip(&self, calibration: &Affine<f64>, u: &Vector3<f64>, rest: &Rest, sine: f64) -> f64 {
-        -self.size * sine - rest.up.dot(&calibration.apply(u))
+    fn dip(&self, model: &Model, of: &Reading, rest: &Rest, sine: f64) -> f64 {
+        -self.size * sine - rest.up.dot(&model.apply(of))
     }
 
     /// What `relation` leaves out of these readings, besides `rests`.
     fn left_out(&self, relation: &Relation, rests: Vec<[f64; 2]>) -> LeftOut {
         let spans = joined([relation.left_out.clone(), rests].concat());
         let is_out = |k: usize| spans.iter().any(|[a, b]| (*a..*b).contains(&self.raw.t[k]));
-        let calibration = relation.calibration();
+        let model = Model::of(&relation.at);
         let turns = self
             .pairs
             .iter()
@@ -342,7 +456,7 @@ impl<'a> Problem<'a> {
         let at_rest = self.rests.iter();
         let at_rest = at_rest
             .filter(|(_, rest)| spans.iter().any(|[a, b]| (*a..*b).contains(&rest.middle())));
-        let dips = at_rest.map(|(u, rest)| self.dip(&calibration, u, rest, relation.at[DIP]));
+        let dips = at_rest.map(|(of, rest)| self.dip(&model, of, rest, relation.at[DIP]));
         let [turns, dips] = [turns.collect::<Vec<_>>(), dips.collect()]
             .map(mimu_recording::statistics::root_mean_square);
         let total = self
@@ -353,7 +467,7 @@ impl<'a> Problem<'a> {
             .map_or(f64::NAN, |(b, a)| b - a);
         LeftOut {
             share: spans.iter().map(|[a, b]| b - a).sum::<f64>() / total,
-            size: self.size_rms(&calibration, is_out) / self.size,
+            size: self.size_rms(&relation.at, is_out) / self.size,
             // NaN, without a turn or a rest, is the lesser.
             angle_rad: turns.max(dips) / self.size,
             spans,
@@ -368,9 +482,9 @@ impl<'a> Problem<'a> {
         let halves = [true, false].map(|first| clusters.moved(|g| used[g] && (g < half) == first));
         let halves_rad = match halves {
             [Some(a), Some(b)] => {
-                let apart = (a - b).fixed_rows::<12>(0).into_owned();
+                let apart = Model::of(&(a - b));
                 let each = self.used.iter();
-                let each = each.map(|k| (by_calibration(&self.raw.x[*k]) * apart).norm_squared());
+                let each = each.map(|k| apart.apply(&self.reading(*k)).norm_squared());
                 (each.sum::<f64>() / self.used.len() as f64).sqrt() / self.size
             }
             _ => f64::INFINITY,
@@ -380,7 +494,8 @@ impl<'a> Problem<'a> {
             worst_rad: self.worst(&calibration, &relation.solution.covariance)?,
             rests: self.rests.len(),
             at_rest: self.errors_at(&self.rests.iter().collect::<Vec<_>>(), &relation),
-            size_rms: self.size_rms(&calibration, is_used),
+            size_rms: self.size_rms(&relation.at, is_used),
+            temp_c: None,
             left_out,
             halves_rad,
             relation,
@@ -408,7 +523,7 @@ impl<'a> Problem<'a> {
 
 impl Equations for Problem<'_> {
     fn known(&self) -> DVector<f64> {
-        let mut known = DVector::repeat(COUNT, f64::INFINITY);
+        let mut known = DVector::repeat(self.count(), f64::INFINITY);
         known[DELAY] = DELAY_S;
         known[DIP] = 1.0;
         known.fixed_rows_mut::<3>(BIAS).fill(self.bias);
@@ -428,7 +543,8 @@ impl Equations for Problem<'_> {
         groups: &mut Groups,
         used: &[bool],
     ) {
-        let calibration = affine(&at.fixed_rows::<12>(0).into_owned());
+        let model = Model::of(at);
+        let matrix = model.calibration.matrix;
         for pair in &self.pairs {
             let Some((residual, by)) = self.turn(*pair, at) else {
                 continue;
@@ -443,16 +559,15 @@ impl Equations for Problem<'_> {
             }
             clusters.correct(
                 piece,
-                &of_matrix(&(2.0 * weight * self.noise * calibration.matrix)),
+                &of_matrix(&(2.0 * weight * self.noise * matrix), at.len()),
             );
         }
-        let shift = self.noise * calibration.matrix.norm_squared() / 3.0 / self.size;
+        let shift = self.noise * matrix.norm_squared() / 3.0 / self.size;
         for &k in &self.used {
-            let x = calibration.apply(&self.raw.x[k]);
+            let reading = self.reading(k);
+            let x = model.apply(&reading);
             let along = x.normalize();
-            let mut by = DVector::zeros(COUNT);
-            by.fixed_rows_mut::<12>(0)
-                .copy_from(&(by_calibration(&self.raw.x[k]).transpose() * along));
+            let by = reading.along(&along, at.len());
             let residual = self.size + shift - x.norm();
             let piece = self.pieces.of(self.raw.t[k]);
             if used[piece] {
@@ -460,15 +575,13 @@ impl Equations for Problem<'_> {
             }
             let weight = groups.weight(SIZES);
             clusters.add(piece, residual, &by, weight);
-            let own = weight * self.noise * along * along.transpose() * calibration.matrix;
-            clusters.correct(piece, &of_matrix(&own));
+            let own = weight * self.noise * along * along.transpose() * matrix;
+            clusters.correct(piece, &of_matrix(&own, at.len()));
         }
-        for (u, rest) in &self.rests {
-            let mut by = DVector::zeros(COUNT);
-            by.fixed_rows_mut::<12>(0)
-                .copy_from(&(by_calibration(u).transpose() * rest.up));
+        for (of, rest) in &self.rests {
+            let mut by = of.along(&rest.up, at.len());
             by[DIP] = self.size;
-            let residual = self.dip(&calibration, u, rest, at[DIP]);
+            let residual = self.dip(&model, of, rest, at[DIP]);
             let piece = self.pieces.of(rest.middle());
             if used[piece] {
                 groups.count(DIPS, residual * residual, 1.0);
@@ -488,9 +601,9 @@ impl Equations for Problem<'_> {
     }
 }
 
-/// A matrix in the place of C among the parameters.
-fn of_matrix(matrix: &Matrix3<f64>) -> DVector<f64> {
-    let mut all = DVector::zeros(COUNT);
+/// A matrix in the place of C among so many parameters.
+fn of_matrix(matrix: &Matrix3<f64>, count: usize) -> DVector<f64> {
+    let mut all = DVector::zeros(count);
     let rows: SVector<f64, 9> = SVector::from_fn(|k, _| matrix[(k / 3, k % 3)]);
     all.fixed_rows_mut::<9>(0).copy_from(&rows);
     all

@@ -6,6 +6,7 @@ use mimu_core::compensation::Affine;
 use mimu_recording::{TriadKind, TriadName};
 use nalgebra::{Matrix3, Rotation3, SMatrix, SVector, Vector3};
 
+use crate::iron::Iron;
 use crate::relation::{DELAY, Relation};
 
 /// A number, or why it is not known.
@@ -32,6 +33,8 @@ pub struct FittedTriad {
     pub lever_arm_mm: Known<[Estimate; 3]>,
     /// Angle of the field below the level, degrees; only of a magnetometer.
     pub dip_deg: Option<Known<Estimate>>,
+    /// How its hard iron moves with the temperature, if it does; only of a magnetometer.
+    pub iron: Option<Iron>,
     /// Rms error, in sample, in `unit`: of means over [`Self::window_s`].
     pub rms: f64,
     /// The same in pieces of time that the fit has not used.
@@ -77,6 +80,7 @@ impl FittedTriad {
             delay_ms: Ok(relation.estimate(DELAY, 1e3)),
             lever_arm_mm: Err("it reads the same everywhere on a body".to_string()),
             dip_deg: None,
+            iron: None,
             rms: errors.rms,
             held_out_rms: errors.held_out_rms,
             noise_floor: errors.noise_floor,

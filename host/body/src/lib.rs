@@ -11,6 +11,7 @@ mod clustered;
 mod errors;
 mod field;
 mod fitted;
+mod iron;
 mod judge;
 mod live;
 mod pairs;
@@ -35,6 +36,7 @@ use mimu_recording::{RawUnit, Recording, TriadKind, TriadName};
 
 pub use accel_delay::accel_delay_ms;
 pub use fitted::{FittedTriad, Known};
+pub use iron::Iron;
 pub use live::{Departure, FieldSoFar};
 pub use pairs::Pairs;
 pub use split::Split;
@@ -43,6 +45,7 @@ pub use verify::{TriadVerification, verify};
 
 use carrier::{Carrier, Unit, read};
 use field::Field;
+use iron::Warmth;
 use relation::{DELAY, Relation};
 use series::Series;
 
@@ -119,8 +122,13 @@ impl Body {
             return Ok(None);
         }
         let models = PerSensor::from_fn(|sensor| Some(unit.triads[sensor].as_ref()?.inverse));
+        let warmth = match more.iter().any(|name| name.kind == TriadKind::Mag) {
+            true => Warmth::read(recording)?,
+            false => None,
+        };
         let fitting = Fitting {
             carrier: Carrier::read(recording, &models)?,
+            warmth: warmth.filter(Warmth::varies),
             unit,
         };
         let mut body = Self {
@@ -162,6 +170,8 @@ impl Body {
 struct Fitting<'a> {
     unit: &'a Unit,
     carrier: Carrier,
+    /// The temperature, if it varies.
+    warmth: Option<Warmth>,
 }
 
 impl Fitting<'_> {
@@ -251,7 +261,13 @@ impl Fitting<'_> {
         };
         let size = options.field_ut.unwrap_or(1.0);
         let raw = raw.without_repeats();
-        let field = Field::of(&raw, motion, &self.unit.rests, size, self.unit.rate_bias).ok_or_else(|| {
+        let known = (size, self.unit.rate_bias);
+        let of = |warm| Field::of(&raw, motion, &self.unit.rests, known, warm);
+        let warm = self.warmth.as_ref().map(|of| (of, of.mean_c()));
+        // A field that is disturbed for another reason may change as the temperature does.
+        let moving = warm.and_then(|_| of(warm));
+        let moving = moving.filter(|field| judge::field(field, size).is_good());
+        let field = moving.or_else(|| of(None)).ok_or_else(|| {
             judge::undetermined("the field turns too little in its readings: bring each axis to point each way, and turn about all three")
         })?;
         judge::determines(&field)?;
@@ -272,6 +288,7 @@ impl Fitting<'_> {
             triad.delay_ms = Err("the body turns too slowly to show a delay".into());
         }
         triad.dip_deg = Some(field.dip_deg());
+        triad.iron = field.iron(&triad.rotation);
         triad.left_out = field.left_out.spans;
         Ok(triad)
     }

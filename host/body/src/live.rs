@@ -59,7 +59,7 @@ impl FieldSoFar {
         if raw.len() < FEWEST {
             return Ok(None);
         }
-        let field = Field::of(&raw, motion, &unit.rests, 1.0, unit.rate_bias);
+        let field = Field::of(&raw, motion, &unit.rests, (1.0, unit.rate_bias), None);
         let determined = field.filter(|f| judge::determines(f).is_ok() && f.rests >= FEWEST_RESTS);
         Ok(determined.map(|field| Self::by(&field, accel)))
     }

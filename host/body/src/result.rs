@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use mimu::calibration::body::BodyTriad;
+use mimu::calibration::body::{BodyTriad, MovingIron};
 use mimu::judgement::Judgement;
 use mimu::parameter::{ParameterKind, TriadParameter};
 use mimu::quantity::{raw_unit, rounded, scale_unit};
@@ -101,8 +101,22 @@ pub struct PlaceResult {
     /// Angle of the field below the level, degrees; of a magnetometer.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub dip_deg: Option<EstimateResult>,
+    /// How the hard iron of a magnetometer moves with the temperature, where it does.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub iron: Option<IronResult>,
     /// Why a number is null.
     pub reasons: BTreeMap<&'static str, String>,
+}
+
+/// Hard iron that moves with the temperature.
+#[derive(Debug, Clone, Serialize)]
+pub struct IronResult {
+    /// By how much its field grows per kelvin, in the triad's own frame.
+    pub per_k: [EstimateResult; 3],
+    /// Per kelvin.
+    pub unit: String,
+    /// The temperature at which o holds, °C.
+    pub temp_c: f64,
 }
 
 /// A triad without a calibration.
@@ -125,9 +139,14 @@ impl BodyResult {
         });
         Self {
             sensors: sensors.collect(),
-            body: body.triads.iter().map(PlaceResult::of).collect(),
+            body: Self::places(body),
             refused: refused.collect(),
         }
+    }
+
+    /// How each triad stands on a body.
+    pub fn places(body: &Body) -> Vec<PlaceResult> {
+        body.triads.iter().map(PlaceResult::of).collect()
     }
 }
 
@@ -217,6 +236,11 @@ impl PlaceResult {
             delay_ms,
             lever_arm_mm: arm.map(|arm| arm.map(Into::into)),
             dip_deg,
+            iron: of.iron.map(|iron| IronResult {
+                per_k: iron.per_k.map(Into::into),
+                unit: format!("{}/K", of.unit),
+                temp_c: iron.temp_c,
+            }),
             reasons,
         }
     }
@@ -263,5 +287,10 @@ fn table(of: &FittedTriad, raw: RawUnit) -> BodyTriad {
         lever_arm_mm: arm.map(|arm| arm.map(|e| e.value)),
         interval_lever_arm_mm: arm.map(|arm| arm.map(|e| interval(&e))),
         judgement: Some(of.judgement.clone()),
+        iron: of.iron.map(|iron| MovingIron {
+            per_k: iron.per_k.map(|e| e.value),
+            interval_per_k: iron.per_k.map(|e| interval(&e)),
+            temp_c: iron.temp_c,
+        }),
     }
 }

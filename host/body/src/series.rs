@@ -21,25 +21,24 @@ impl Series {
     /// Of the samples whose three readings are numbers, in order of time.
     pub fn new(t: &[f64], axes: [&[f64]; 3]) -> Self {
         let clipped = Clipped::of(axes);
-        let (mut all, mut saturated) = (Vec::new(), Vec::new());
+        let (mut times, mut all, mut saturated) = (Vec::new(), Vec::new(), Vec::new());
         let mut is_saturated = false;
         for (k, &at) in t.iter().enumerate() {
             let x = Vector3::new(axes[0][k], axes[1][k], axes[2][k]);
             if clipped.contains(&x) {
                 is_saturated = true;
-            } else if x.iter().all(|v| v.is_finite())
-                && all.last().is_none_or(|(last, _)| at > *last)
+            } else if x.iter().all(|v| v.is_finite()) && times.last().is_none_or(|last| at > *last)
             {
-                all.push((at, x));
+                times.push(at);
+                all.push(x);
                 saturated.push(std::mem::take(&mut is_saturated));
             }
         }
-        Self::of(all, &saturated)
+        Self::of(times, all, &saturated)
     }
 
     /// Of these samples; before some of them a reading was saturated.
-    fn of(all: Vec<(f64, Vector3<f64>)>, saturated: &[bool]) -> Self {
-        let (t, x): (Vec<f64>, Vec<_>) = all.into_iter().unzip();
+    fn of(t: Vec<f64>, x: Vec<Vector3<f64>>, saturated: &[bool]) -> Self {
         let between = t.windows(2).map(|w| w[1] - w[0]);
         let period = mimu_recording::units::median(between.clone().collect()).unwrap_or(f64::NAN);
         let broken = between.zip(&saturated[1.min(saturated.len())..]);
@@ -82,20 +81,16 @@ impl Series {
 
     /// Of the samples with these numbers only, so much earlier.
     fn only(&self, kept: &[usize], age: f64) -> Self {
-        let all = kept.iter().map(|k| (self.t[*k] - age, self.x[*k]));
+        let (t, x) = kept.iter().map(|k| (self.t[*k] - age, self.x[*k])).unzip();
         let before = kept.iter().take(1).chain(kept).zip(kept);
         let broken: Vec<bool> = before.map(|(a, b)| self.is_broken(*a, *b)).collect();
-        Self::of(all.collect(), &broken)
+        Self::of(t, x, &broken)
     }
 
-    /// Each reading through `map`.
-    pub fn map(&self, map: impl Fn(&Vector3<f64>) -> Vector3<f64>) -> Self {
-        Self {
-            t: self.t.clone(),
-            x: self.x.iter().map(map).collect(),
-            period: self.period,
-            broken: self.broken.clone(),
-        }
+    /// Each reading through `map`, in its place: hours of a triad are hundreds of megabytes.
+    pub fn map(mut self, map: impl Fn(&Vector3<f64>) -> Vector3<f64>) -> Self {
+        self.x.iter_mut().for_each(|x| *x = map(x));
+        self
     }
 
     /// Numbers of the samples in a span of time, s.

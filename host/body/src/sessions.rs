@@ -1,8 +1,10 @@
-//! The further triads of several sessions of one body: expected values at the next power-on, by the random-effects model of the first two ([`between`]).
+//! The further triads of several sessions of one body at the next power-on, by the random-effects model of the first two ([`between`]). Their intervals are those of
+//! that power-on: a calibration file has one interval for each number of a further triad, and it is used then.
 
 use mimu::judgement::Judgement;
-use mimu::sessions::between::{Between, Design, Estimates, Kinds, VariancePrior, fit};
+use mimu::sessions::between::{Between, Design, Estimates, Kinds, OfParameter, VariancePrior, fit};
 use mimu::sessions::free;
+use mimu::sessions::mixture::{Matched, Mixture};
 use mimu::triad::{Covariance, Estimate, Part, Triad};
 use mimu_recording::TriadName;
 use nalgebra::{DMatrix, DVector, Rotation3, Vector3};
@@ -91,6 +93,8 @@ fn combined(all: &[&FittedTriad]) -> Option<FittedTriad> {
         noise_floor: rms(|t| t.noise_floor),
         windows: all.iter().map(|t| t.windows).sum(),
         left_out: Vec::new(),
+        // What it adds from session to session is in the scatter of their offsets.
+        iron: None,
         judgement: Judgement::worst(all.iter().map(|t| t.judgement.clone()))?,
         ..first.clone()
     })
@@ -127,20 +131,20 @@ fn calibration(all: &[&FittedTriad]) -> Option<Triad> {
         size: free.iter().map(size).collect(),
     };
     let between = between(&sessions.collect::<Vec<_>>(), &kinds)?;
-    let matched: Vec<_> = between
-        .parameters
-        .iter()
-        .map(|p| p.common.matched())
-        .collect();
+    let [common, next] = [common, next].map(|of| matched(&between, of));
     let mut covariance = Covariance::zeros();
     for (i, a) in free.iter().enumerate() {
-        values[*a] = matched[i].mean;
+        values[*a] = next[i].mean;
         for (j, b) in free.iter().enumerate() {
-            let by = |k: usize| (matched[k].variance / between.expected[(k, k)]).sqrt();
-            covariance[(*a, *b)] = between.expected[(i, j)] * by(i) * by(j);
+            let by = |k: usize| (common[k].variance / between.expected[(k, k)]).sqrt();
+            // What changes at a power-on is independent between the parameters.
+            covariance[(*a, *b)] = match i == j {
+                true => next[i].variance,
+                false => between.expected[(i, j)] * by(i) * by(j),
+            };
         }
     }
-    let dof = matched.iter().map(|m| m.dof).fold(f64::INFINITY, f64::min);
+    let dof = next.iter().map(|m| m.dof).fold(f64::INFINITY, f64::min);
     Triad::from_physical(
         &values,
         &[Part {
@@ -150,7 +154,7 @@ fn calibration(all: &[&FittedTriad]) -> Option<Triad> {
     )
 }
 
-/// Expected values of numbers of one kind, of those of each session. `None` without a session.
+/// Numbers of one kind at the next power-on, by those of each session. `None` without a session.
 fn expected<const N: usize>(all: &[[Estimate; N]]) -> Option<[Estimate; N]> {
     if let [one] = all {
         return Some(*one);
@@ -164,16 +168,29 @@ fn expected<const N: usize>(all: &[[Estimate; N]]) -> Option<[Estimate; N]> {
         size: vec![1.0; N],
     };
     let between = between(&sessions.collect::<Vec<_>>(), &kinds)?;
-    let matched: Vec<_> = between
-        .parameters
-        .iter()
-        .map(|p| p.common.matched())
-        .collect();
+    let next = matched(&between, next);
     Some(std::array::from_fn(|i| Estimate {
-        value: matched[i].mean,
-        sigma: matched[i].variance.sqrt(),
-        interval: matched[i].half_width,
+        value: next[i].mean,
+        sigma: next[i].variance.sqrt(),
+        interval: next[i].half_width,
     }))
+}
+
+/// The expected value of a parameter.
+fn common(of: &OfParameter) -> &Mixture {
+    &of.common
+}
+
+/// Its value at the next power-on.
+fn next(of: &OfParameter) -> &Mixture {
+    &of.next
+}
+
+fn matched(between: &Between, of: fn(&OfParameter) -> &Mixture) -> Vec<Matched> {
+    let parameters = between.parameters.iter();
+    parameters
+        .map(|parameter| of(parameter).matched())
+        .collect()
 }
 
 fn between(sessions: &[Estimates], kinds: &Kinds) -> Option<Between> {

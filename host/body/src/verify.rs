@@ -13,6 +13,7 @@ use serde::Serialize;
 
 use crate::carrier::{Carrier, read};
 use crate::field::Field;
+use crate::iron::Warmth;
 use crate::standing::Standing;
 use crate::{judge, same_body};
 
@@ -56,8 +57,9 @@ pub fn verify(
         calibration.inverse(sensor).or(as_it_reads)
     });
     let carrier = Carrier::read(recording, &models)?;
+    let warmth = Warmth::read(recording)?;
     for of in own {
-        let judged = one(&carrier, recording, of)?;
+        let judged = one(&carrier, warmth.as_ref(), recording, of)?;
         found.extend(judged.map(|judged| (of.triad.to_string(), judged)));
     }
     Ok(found)
@@ -66,6 +68,7 @@ pub fn verify(
 /// `None` if the first triad of its kind is missing, or nothing moves.
 fn one(
     carrier: &Carrier,
+    warmth: Option<&Warmth>,
     recording: &Recording,
     of: &BodyTriad,
 ) -> Result<Option<TriadVerification>> {
@@ -81,7 +84,8 @@ fn one(
                 "field" => Some(1.0),
                 _ => None,
             };
-            let Some((errors, [size_rms, size])) = Field::errors(raw, motion, &standing, size)
+            let Some((errors, [size_rms, size])) =
+                Field::errors(raw, motion, &standing, size, warmth)
             else {
                 return Ok(None);
             };

@@ -40,7 +40,7 @@ mod wizard;
 pub use accept::{accept_line, accept_text};
 pub use allan::allan_text;
 pub use apply::{apply_text, mean_text};
-pub(crate) use body::{Joined, body_errors_text, body_text, delay_text, split_text};
+pub(crate) use body::{Joined, body_errors_text, body_text, delay_text, iron_text, split_text};
 pub use compare::compare_text;
 pub use design::{design_text, next_text};
 pub use device::{

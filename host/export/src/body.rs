@@ -98,6 +98,13 @@ pub(crate) fn line(triad: &BodyTriad) -> String {
         let arm_mm = three(arm_mm, 2);
         line += &format!("; at {arm_mm} mm from {reference}, in the frame of {reference}");
     }
+    if let Some(iron) = triad.iron {
+        let (per_k, unit) = (three(iron.per_k, 4), &triad.unit);
+        line += &format!(
+            "; at {:.1} °C: its iron adds {per_k} {unit} per kelvin, which is left",
+            iron.temp_c
+        );
+    }
     line
 }
 

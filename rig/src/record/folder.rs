@@ -208,10 +208,14 @@ fn further(truth: &RigTruth) -> String {
         let Some(relation) = triad.relation(&truth.unit) else {
             continue;
         };
+        let iron = match relation.iron_per_c {
+            [0.0, 0.0, 0.0] => String::new(),
+            per_c => format!(" Per kelvin of the board above 25 °C its iron adds {per_c:?} to x."),
+        };
         let _ = writeln!(
             text,
             "# {}: x = C u + o in its own frame (x along its first axis, y in the plane of the first two), in {}, with C = {:?} and o = {:?}.\n\
-             # Rotation vector to the frame of the first accelerometer: {:?} deg. It is {:.4} ms later than {}, at {:?} mm.",
+             # Rotation vector to the frame of the first accelerometer: {:?} deg. It is {:.4} ms later than {}, at {:?} mm.{}",
             triad.name,
             triad.kind.unit(),
             relation.inverse.matrix,
@@ -220,6 +224,7 @@ fn further(truth: &RigTruth) -> String {
             relation.delay_ms,
             triad.kind.reference(),
             relation.lever_mm,
+            iron,
         );
     }
     text

@@ -38,6 +38,9 @@ pub struct TriadFile {
     /// Quantisation; 0: none. Default: 1 count, or a code of the converter.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub step_raw: Option<f64>,
+    /// Field of iron on the board per kelvin of the board above 25 °C, triad's axes; only of a magnetometer. Default 0.
+    #[serde(default)]
+    pub iron_ut_per_c: Vector,
     /// Its sensors; directions are in the triad's axes.
     #[serde(default)]
     pub axes: AxesFile,
@@ -95,7 +98,7 @@ impl TriadFile {
     }
 
     fn check(&self, file: &RigFile, i: usize) -> Result<(), Refusal> {
-        let (_, parts) = self.parts(file, i)?;
+        let (kind, parts) = self.parts(file, i)?;
         let at = |key: &str| format!("triad.{i}.{key}");
         if file.triad[..i].iter().any(|other| other.name == self.name) {
             let problem = format!("triad `{}` occurs twice", self.name);
@@ -105,6 +108,11 @@ impl TriadFile {
         model(&at("affine"), &self.affine, &at("axes"), &self.axes)?;
         within(&at("rotation_deg"), &self.rotation_deg, [-360.0, 360.0])?;
         within(&at("lever_mm"), &self.lever_mm, [-1e4, 1e4])?;
+        if kind != MeasuredQuantity::Mag && self.iron_ut_per_c != [0.0; 3] {
+            let problem = format!("`{}` feels no iron: only a magnetometer does", self.name);
+            return refuse(at("iron_ut_per_c"), problem, "remove it");
+        }
+        within(&at("iron_ut_per_c"), &self.iron_ut_per_c, [-1e3, 1e3])?;
         within(&at("delay_ms"), &[self.delay_ms], [-1000.0, 1000.0])?;
         within(&at("every"), &[f64::from(self.every)], [1.0, 1e6])?;
         within(&at("step_raw"), self.step_raw.as_slice(), [0.0, 1e9])
@@ -139,6 +147,7 @@ impl RigFile {
                 every: file.every,
                 between: file.between,
                 step_raw,
+                iron_per_c: file.iron_ut_per_c,
             })
         });
         let resolved = resolved.collect::<Result<_, _>>();

@@ -1,8 +1,10 @@
 //! Estimators and diagnosis from recording to result, on the virtual bench and on real units.
 
 mod agreement;
+mod beside_imu_tk;
 mod bias_removal;
 mod body;
+mod body_sessions;
 mod coverage;
 mod diagnosis;
 mod earth;

@@ -3,30 +3,11 @@
 use mimu::diagnose::{Diagnosis, Recordings, diagnose};
 use mimu::fit::Options;
 use mimu::prepared::Prepared;
-use mimu::signal::stillness::STILL_FACTOR;
-use mimu_tests::recordings::{Foreign, xsens_session};
+use mimu_tests::recordings::xsens_session;
 
 /// The two halves; `None` if the data are missing.
 fn halves() -> Option<[Prepared; 2]> {
-    let session = xsens_session()?;
-    let half = |second: bool| {
-        let folder = tempfile::tempdir().expect("a folder");
-        let files = session.files.iter().map(|(file, columns)| {
-            let text = std::fs::read_to_string(file).expect("the file was there a moment ago");
-            let lines: Vec<&str> = text.lines().collect();
-            let (first, last) = lines.split_at(lines.len() / 2);
-            let part = folder.path().join(file.file_name().expect("a file"));
-            std::fs::write(&part, if second { last } else { first }.join("\n")).expect("written");
-            (part, *columns)
-        });
-        let foreign = Foreign {
-            files: files.collect(),
-            ..session.clone()
-        };
-        let recording = foreign.import(&folder).expect("importable");
-        Prepared::read(&recording, STILL_FACTOR, |_| ()).expect("readable")
-    };
-    Some([false, true].map(half))
+    Some(xsens_session()?.halves().map(|(half, _)| half))
 }
 
 fn judged(first: Prepared, second: Prepared) -> Diagnosis {

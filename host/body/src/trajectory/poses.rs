@@ -107,7 +107,7 @@ impl Poses {
         });
         let rates: Vec<(f64, f64)> = rates.collect();
         let mean = raw.x.iter().sum::<Vector3<f64>>() / raw.len() as f64;
-        let size = raw.map(|u| Vector3::repeat((u - mean).norm()));
+        let size = raw.clone().map(|u| Vector3::repeat((u - mean).norm()));
         let steps = (SEARCHED_S / GRID_S) as i32;
         let likeness = |lag: f64| {
             correlation(

@@ -1,6 +1,7 @@
 //! `mimu diagnose`: arguments and execution.
 
 use std::cell::RefCell;
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use crate::opening;
@@ -12,7 +13,7 @@ use mimu::{
     DiagnosisResult, DwellSearch, Estimate, NoiseFile, OfRecording, Options as FitOptions,
     Prepared, Recordings, Sensor, fit,
 };
-use mimu_body::result::EstimateResult;
+use mimu_body::result::{BodyResult, EstimateResult, PlaceResult};
 use mimu_body::{Body, Options, Pairs, Split, accel_delay_ms};
 use mimu_recording::{Recording, Result};
 use serde::Serialize;
@@ -131,6 +132,9 @@ pub struct Further {
     split: Option<Split>,
     /// Of the accelerometer against the gyro, ms.
     delay_ms: Option<Estimate>,
+    body: Option<Body>,
+    /// Magnetometers whose hard iron moves with the temperature.
+    iron: Vec<PlaceResult>,
 }
 
 impl Further {
@@ -138,10 +142,24 @@ impl Further {
     ///
     /// # Errors
     /// They cannot be read.
-    pub fn of(samples: Option<&Recording>, done: &Diagnosed, split: Option<Split>) -> Result<Self> {
+    pub fn of(
+        samples: Option<&Recording>,
+        done: &Diagnosed,
+        split: Option<Split>,
+        args: &DiagnoseArgs,
+    ) -> Result<Self> {
+        let before = &done.diagnosis.before;
+        let options = Options {
+            field_ut: args.field,
+        };
+        let body = samples.map(|of| Body::of(of, before, &options));
+        let body = body.transpose()?.flatten();
+        let places = body.as_ref().map(BodyResult::places).unwrap_or_default();
         let samples = samples.filter(|_| done.result.effects.is_empty());
-        let delay_ms = samples.map(|samples| accel_delay_ms(samples, &done.diagnosis.before));
+        let delay_ms = samples.map(|samples| accel_delay_ms(samples, before));
         Ok(Self {
+            iron: places.into_iter().filter(|of| of.iron.is_some()).collect(),
+            body,
             split,
             delay_ms: delay_ms.transpose()?.flatten(),
         })
@@ -151,7 +169,8 @@ impl Further {
     pub fn text(&self) -> String {
         let delay = self.delay_ms.as_ref().map(report::delay_text);
         let split = self.split.as_ref().map(report::split_text);
-        delay.into_iter().chain(split).collect()
+        let iron = report::iron_text(&self.iron);
+        delay.into_iter().chain(split).chain([iron]).collect()
     }
 
     /// The diagnosis with it, as JSON.
@@ -160,6 +179,9 @@ impl Further {
         more.extend(self.split.as_ref().map(|of| ("body".to_owned(), json!(of))));
         let delay = self.delay_ms.map(EstimateResult::from);
         more.extend(delay.map(|of| ("accel_delay_ms".to_owned(), json!(of))));
+        let iron = self.iron.iter().map(|of| (of.triad.to_string(), &of.iron));
+        let iron: BTreeMap<_, _> = iron.collect();
+        more.extend((!iron.is_empty()).then(|| ("iron".to_owned(), json!(iron))));
         let more = (!more.is_empty()).then_some(Value::Object(more));
         Joined::of(found, more.as_ref())
     }
@@ -264,12 +286,7 @@ pub fn run(args: &DiagnoseArgs, command_line: &str) -> Result<Status> {
         next: args.next,
     };
     let before = &diagnosis.before;
-    let options = Options {
-        field_ut: args.field,
-    };
-    let body = samples.map(|of| Body::of(of, before, &options));
-    let body = body.transpose()?.flatten();
-    let further = Further::of(samples, &done, split)?;
+    let further = Further::of(samples, &done, split, args)?;
     let mut out = Results::new(report::diagnosis_text(found, detail) + &further.text());
     let place = diagnosis.before.prepared.place.clone();
     let refusal = args.writing.refusal(&found.judgement, &place, MISFIT);
@@ -278,7 +295,8 @@ pub fn run(args: &DiagnoseArgs, command_line: &str) -> Result<Status> {
     out.file("calibration", output, || {
         let mut made = done.calibration(&now)?;
         let raw = before.prepared.manifest.raw_unit;
-        made.body = body.iter().flat_map(|body| body.tables(raw)).collect();
+        let body = further.body.iter();
+        made.body = body.flat_map(|body| body.tables(raw)).collect();
         Ok(made.to_toml())
     })?;
     out.file("page", args.page.as_ref(), || {

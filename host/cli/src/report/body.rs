@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 
 use maud::{Markup, html};
 use mimu::judgement::JudgementKind;
-use mimu::quantity::{p_value, plural, significant};
+use mimu::quantity::{AXES, p_value, plural, significant};
 use mimu::triad::Estimate;
 use mimu_body::TriadVerification;
-use mimu_body::result::{BodyResult, EstimateResult, PlaceResult};
+use mimu_body::result::{BodyResult, EstimateResult, IronResult, PlaceResult};
 use mimu_body::split::{Part, Split};
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -46,6 +46,30 @@ pub(crate) fn delay_text(delay_ms: &Estimate) -> String {
     format!(
         "\naccelerometer: {ms} ± {interval} ms {later} than the gyro, by the velocity at rest around turns\n"
     )
+}
+
+/// How iron moves with the temperature, in words.
+fn iron_moves(iron: &IronResult) -> String {
+    let axes = iron.per_k.iter().zip(AXES).map(|(of, axis)| {
+        let [value, interval] = [of.value, of.upper - of.value].map(significant);
+        format!("{axis} {value} ± {interval}")
+    });
+    let axes: Vec<String> = axes.collect();
+    let unit = iron.unit.replace('u', "µ");
+    format!(
+        "its hard iron moves with the temperature, {} {unit}; the offset is that at {:.1} °C",
+        axes.join(", "),
+        iron.temp_c
+    )
+}
+
+/// The magnetometers of a body whose hard iron moves with the temperature, as text.
+pub(crate) fn iron_text(places: &[PlaceResult]) -> String {
+    let moving = places
+        .iter()
+        .filter_map(|of| Some((of.triad, of.iron.as_ref()?)));
+    let lines = moving.map(|(triad, iron)| format!("\n{triad}: {}\n", iron_moves(iron)));
+    lines.collect()
 }
 
 /// What turns err by in common to all pairs of a body, and each for itself, as text.
@@ -150,6 +174,7 @@ pub(super) fn section(body: &BodyResult) -> Markup {
         @for place in places.iter().filter(|p| p.dip_deg.as_ref().is_some_and(|dip| dip.value < 0.0)) {
             p.line { (place.triad) ": the field points up, as it does in the south; in the north an axis of it has the wrong sign, or two are exchanged (--latitude)" }
         }
+        @for place in places { @if let Some(iron) = &place.iron { p.line { (place.triad) ": " (iron_moves(iron)) } } }
         @for (triad, result) in &body.sensors {
             @if !result.judgement.is_good() { p.line { (triad) " is judged " (result.judgement) } }
             @if !result.left_out_s.is_empty() { p.line { (triad) ": left out, because the rest contradicts them: " (spans(&result.left_out_s)) } }

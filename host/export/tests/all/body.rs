@@ -56,6 +56,7 @@ fn triad(name: &str, unit: &str, c: Matrix, o: [f64; 3]) -> BodyTriad {
         lever_arm_mm: None,
         interval_lever_arm_mm: None,
         judgement: None,
+        iron: None,
     }
 }
 

@@ -61,6 +61,22 @@ pub struct BodyTriad {
     /// Its judgement.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub judgement: Option<Judgement>,
+    /// How the hard iron of a magnetometer moves with the temperature, where it does: `x = C u + o - per_k (T - temp_c)`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub iron: Option<MovingIron>,
+}
+
+/// Hard iron that moves with the temperature.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub struct MovingIron {
+    /// By how much its field grows, in the triad's own frame, in its unit per kelvin.
+    pub per_k: [f64; 3],
+    /// Halves of the 95 % intervals.
+    pub interval_per_k: [f64; 3],
+    /// The temperature at which o holds, °C.
+    pub temp_c: f64,
 }
 
 impl BodyTriad {

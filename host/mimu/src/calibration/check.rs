@@ -103,12 +103,17 @@ impl Calibration {
         for (k, of) in self.body.iter().enumerate() {
             let arm = of.lever_arm_mm.iter().flatten();
             let rotation = of.rotation_deg.iter().flatten();
+            let iron = of
+                .iron
+                .iter()
+                .flat_map(|iron| iron.per_k.iter().chain([&iron.temp_c]));
             let numbers =
                 of.C.iter()
                     .flatten()
                     .chain(&of.o)
                     .chain(rotation)
-                    .chain(arm);
+                    .chain(arm)
+                    .chain(iron);
             let matrix = Matrix3::from_fn(|i, j| of.C[i][j]);
             let problem = if !numbers.chain(&of.delay_ms).all(|x| x.is_finite()) {
                 "it has an entry that is not a number"

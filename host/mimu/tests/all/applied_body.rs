@@ -35,6 +35,7 @@ pub fn turned(triad: &str, unit: &str) -> BodyTriad {
         lever_arm_mm: None,
         interval_lever_arm_mm: None,
         judgement: None,
+        iron: None,
     }
 }
 
