@@ -134,7 +134,7 @@ pub fn judge(all: &[ErrorFigures]) -> Judgement {
             each.collect::<Vec<_>>().join(" and ")
         };
         let reason = format!(
-            "the error of unseen data is {} times what noise predicts; {} times the noise would show",
+            "the error of unseen data is {} times what noise predicts; an error of {} times the noise would be noticed",
             each(|t| t.ratio),
             each(|t| t.visible)
         );
