@@ -209,7 +209,7 @@ impl Foreign {
         models: &PerSensor<Option<Affine<f64>>>,
         given: RawUnit,
     ) -> Result<Calibration> {
-        let frame = format!("that of {}", self.format.name);
+        let frame = self.format.frame();
         let unit = (UNNAMED, self.raw_unit(given), frame.as_str());
         Calibration::of_program(models, unit, &self.place)
     }

@@ -253,6 +253,72 @@ fn noise_is_read_back_in_the_densities_that_were_written() {
     }
 }
 
+/// The file of a format, converted to another, with the notes.
+fn converted(text: &str, to: &str) -> (String, Vec<String>) {
+    let file = foreign::read(text.as_bytes(), "file").unwrap().unwrap();
+    let calibration = file.calibration(RawUnit::Si).unwrap();
+    let noise = file.noise(Some(200.0)).unwrap();
+    let from = Sources {
+        calibration: Some((&calibration, "file")),
+        noise: noise.as_ref(),
+        biases: None,
+    };
+    let format = FORMATS.iter().find(|format| format.name == to).unwrap();
+    let options = match to {
+        "inav" => vec!["--acc-1g".to_owned(), "2048".to_owned()],
+        _ => Vec::new(),
+    };
+    let export = format.chosen(&options).unwrap().export(&from).unwrap();
+    (String::from_utf8(export.content).unwrap(), export.notes)
+}
+
+/// The numbers of x, y and z behind the keys `name`, `#` in place of the axis.
+fn three(text: &str, name: &str) -> [f64; 3] {
+    ["X", "Y", "Z"].map(|axis| {
+        let name = name.replace('#', axis) + ",";
+        let line = text.lines().find_map(|line| line.strip_prefix(&name));
+        line.unwrap_or_else(|| panic!("{name} in {text}"))
+            .parse()
+            .unwrap()
+    })
+}
+
+/// PX4 and ArduPilot calibrate with x forward, y right, z down, Betaflight with x forward, y left, z up, INAV on the axes of the sensor. Offsets in codes of
+/// 1/2048 g.
+#[test]
+fn between_two_choices_of_the_axes_of_the_craft_y_and_z_change_their_signs() {
+    const CODE: f64 = 9.80665 / 2048.0;
+    let codes = [1.20, -19.11, 6.95];
+    let mut px4 = String::new();
+    for (axis, code) in ["X", "Y", "Z"].into_iter().zip(codes) {
+        px4 += &format!("CAL_ACC0_{axis}OFF,{}\nCAL_ACC0_{axis}SCALE,1\n", code * CODE);
+        px4 += &format!("CAL_GYRO0_{axis}OFF,{}\n", 0.001 * code);
+    }
+    let is_rotated = |notes: &[String]| notes.iter().any(|note| note.starts_with("Rotated by"));
+    let (betaflight, notes) = converted(&px4, "betaflight");
+    assert!(betaflight.contains("set acc_calibration = 1,19,-7,1\n"), "{betaflight}");
+    assert!(betaflight.contains("rotated to x forward, y left, z up"), "{betaflight}");
+    assert!(is_rotated(&notes), "{notes:?}");
+    for (to, name) in [("px4", "CAL_ACC0_#OFF"), ("ardupilot", "INS_ACCOFFS_#")] {
+        let (back, notes) = converted(&betaflight, to);
+        assert!(is_rotated(&notes), "{to}: {notes:?}");
+        for (found, whole) in three(&back, name).into_iter().zip([1.0, -19.0, 7.0]) {
+            assert!((found / CODE - whole).abs() < 1e-5, "{to}: {found}");
+        }
+    }
+    // The same axes, and axes that the file does not state.
+    let (ardupilot, notes) = converted(&px4, "ardupilot");
+    assert!(!is_rotated(&notes), "{notes:?}");
+    for (name, size) in [("INS_ACCOFFS_#", CODE), ("INS_GYROFFS_#", 0.001)] {
+        for (found, code) in three(&ardupilot, name).into_iter().zip(codes) {
+            assert!((found / size - code).abs() < 1e-5, "{name}: {found}");
+        }
+    }
+    let (inav, notes) = converted(&px4, "inav");
+    assert!(inav.contains("set acczero_y = -19\n"), "{inav}");
+    assert!(!is_rotated(&notes), "{notes:?}");
+}
+
 #[test]
 fn what_is_missing_is_named_with_its_key() {
     let refused = |text: &str| {
