@@ -183,7 +183,7 @@ fn a_mirrored_compass_is_refused() {
 }
 
 #[test]
-fn a_field_without_a_size_is_refused_where_gauss_are_needed_and_taken_where_directions_are_enough()
+fn a_field_without_a_size_is_left_out_where_gauss_are_needed_and_taken_where_directions_are_enough()
 {
     let field = BodyTriad {
         unit: "field".into(),
@@ -197,11 +197,34 @@ fn a_field_without_a_size_is_refused_where_gauss_are_needed_and_taken_where_dire
         driver: driver::Options::default(),
         mag: body::Options::default(),
     };
-    for refused in [
-        Px4::export(&of(&in_field), &autopilot(None)),
-        ArduPilot::export(&of(&in_field), &autopilot(None)),
-        Adafruit::export(&of(&in_field), &adafruit),
-    ] {
+    let needs_gauss = |calibration: &Calibration| {
+        [
+            Px4::export(&of(calibration), &autopilot(None)),
+            ArduPilot::export(&of(calibration), &autopilot(None)),
+            Adafruit::export(&of(calibration), &adafruit),
+        ]
+    };
+    // Gyro and accelerometer are written as without a magnetometer.
+    for (export, without) in needs_gauss(&in_field)
+        .into_iter()
+        .zip(needs_gauss(&with([])))
+    {
+        let (export, without) = (export.unwrap(), without.unwrap());
+        let values = |export: &Export| {
+            let lines = text(export)
+                .lines()
+                .filter(|line| !line.starts_with(['#', '/']));
+            lines.map(str::to_owned).collect::<Vec<_>>()
+        };
+        assert_eq!(values(&export), values(&without));
+        assert!(values(&export).len() > 1, "{}", text(&export));
+        let said =
+            |note: &String| note.starts_with("mag is not in the file") && note.contains("--field");
+        assert!(export.notes.iter().any(said), "{:?}", export.notes);
+    }
+    let mut alone = in_field.clone();
+    (alone.gyro, alone.accel) = (None, None);
+    for refused in needs_gauss(&alone) {
         let error = refused.unwrap_err().to_string();
         assert!(
             error.contains("[[body]] mag") && error.contains("--field"),
