@@ -71,6 +71,8 @@ pub trait Target {
     const TAKES_RAW: bool = false;
     /// Where the noise is.
     const NOISE_KEYS: &[NoiseKey] = &[];
+    /// Whether its densities are those of the readings that its calibration is for; otherwise those of calibrated ones.
+    const NOISE_OF_READINGS: bool = false;
     /// Key of the messages a second.
     const RATE_KEY: Option<&str> = None;
     /// For a file that [`Keyed`] does not read: its numbers; `None` if it is another file. The second argument is its path.
@@ -123,6 +125,7 @@ pub struct Format {
     pub(crate) not_read: &'static [&'static str],
     pub(crate) takes_raw: bool,
     pub(crate) noise_keys: &'static [NoiseKey],
+    pub(crate) noise_of_readings: bool,
     pub(crate) rate_key: Option<&'static str>,
     pub(crate) unpack: Option<Unpack>,
     pub(crate) whole: Option<Whole>,
@@ -145,6 +148,7 @@ impl Format {
             not_read: T::NOT_READ,
             takes_raw: T::TAKES_RAW,
             noise_keys: T::NOISE_KEYS,
+            noise_of_readings: T::NOISE_OF_READINGS,
             rate_key: T::RATE_KEY,
             unpack: T::UNPACK,
             whole: T::WHOLE,

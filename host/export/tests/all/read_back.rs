@@ -283,6 +283,47 @@ fn three(text: &str, name: &str) -> [f64; 3] {
     })
 }
 
+/// Densities of a Kalibr file are those of its readings, so a scale factor of 5 % leaves them as they are in another such file, and Basalt, whose densities are
+/// those of calibrated readings, gets them divided by it.
+#[test]
+fn noise_of_readings_is_kept_between_files_of_it_and_calibrated_for_the_others() {
+    let kalibr = "accelerometer_noise_density: 0.006\naccelerometer_random_walk: 0.0002\ngyroscope_noise_density: 0.0004\ngyroscope_random_walk: 4.0e-06\nupdate_rate: 200.0\n\
+                  accelerometers:\n  M:\n  - [1.05, 0.0, 0.0]\n  - [0.0, 1.05, 0.0]\n  - [0.0, 0.0, 1.05]\n\
+                  gyroscopes:\n  M:\n  - [0.99732203, 0.0, 0.0]\n  - [0.00373207, 0.99372249, 0.0]\n  - [-0.00218998, -0.00186741, 0.99919668]\n";
+    for to in ["kalibr", "openvins"] {
+        let (text, _) = converted(kalibr, to);
+        for line in [
+            "accelerometer_noise_density: 6.000000e-3 ",
+            "accelerometer_random_walk: 2.000000e-4 ",
+            "gyroscope_noise_density: 4.000000e-4 ",
+            "gyroscope_random_walk: 4.000000e-6 ",
+        ] {
+            assert!(text.contains(line), "{to}: {line}: {text}");
+        }
+    }
+    let (basalt, _) = converted(kalibr, "basalt");
+    let read: serde_json::Value = serde_json::from_str(&basalt).unwrap();
+    for (key, expected) in [
+        ("accel_noise_std", 0.006 / 1.05),
+        ("accel_bias_std", 0.0002 / 1.05),
+    ] {
+        for axis in 0..3 {
+            let found = read["value0"][key][axis].as_f64().unwrap();
+            assert!((found / expected - 1.0).abs() < 1e-9, "{key}: {found}");
+        }
+    }
+    // And back: the readings are noisier again.
+    let (back, _) = converted(&basalt, "kalibr");
+    assert!(
+        back.contains("accelerometer_noise_density: 6.000000e-3 "),
+        "{back}"
+    );
+    let (again, _) = converted(&basalt, "basalt");
+    let again: serde_json::Value = serde_json::from_str(&again).unwrap();
+    let first = |of: &serde_json::Value| of["value0"]["accel_noise_std"][0].as_f64().unwrap();
+    assert!((first(&again) / first(&read) - 1.0).abs() < 1e-12);
+}
+
 /// PX4 and ArduPilot calibrate with x forward, y right, z down, Betaflight with x forward, y left, z up, INAV on the axes of the sensor. Offsets in codes of
 /// 1/2048 g.
 #[test]
@@ -291,13 +332,22 @@ fn between_two_choices_of_the_axes_of_the_craft_y_and_z_change_their_signs() {
     let codes = [1.20, -19.11, 6.95];
     let mut px4 = String::new();
     for (axis, code) in ["X", "Y", "Z"].into_iter().zip(codes) {
-        px4 += &format!("CAL_ACC0_{axis}OFF,{}\nCAL_ACC0_{axis}SCALE,1\n", code * CODE);
+        px4 += &format!(
+            "CAL_ACC0_{axis}OFF,{}\nCAL_ACC0_{axis}SCALE,1\n",
+            code * CODE
+        );
         px4 += &format!("CAL_GYRO0_{axis}OFF,{}\n", 0.001 * code);
     }
     let is_rotated = |notes: &[String]| notes.iter().any(|note| note.starts_with("Rotated by"));
     let (betaflight, notes) = converted(&px4, "betaflight");
-    assert!(betaflight.contains("set acc_calibration = 1,19,-7,1\n"), "{betaflight}");
-    assert!(betaflight.contains("rotated to x forward, y left, z up"), "{betaflight}");
+    assert!(
+        betaflight.contains("set acc_calibration = 1,19,-7,1\n"),
+        "{betaflight}"
+    );
+    assert!(
+        betaflight.contains("rotated to x forward, y left, z up"),
+        "{betaflight}"
+    );
     assert!(is_rotated(&notes), "{notes:?}");
     for (to, name) in [("px4", "CAL_ACC0_#OFF"), ("ardupilot", "INS_ACCOFFS_#")] {
         let (back, notes) = converted(&betaflight, to);
