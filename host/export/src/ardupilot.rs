@@ -111,7 +111,10 @@ impl Target for ArduPilot {
         Entry::of(Sensor::Accel, Numbers::LeftDiagonal, "INS_ACCSCAL_{AXIS}"),
         Entry::of(Sensor::Gyro, Numbers::Bias, "INS_GYROFFS_{AXIS}"),
     ];
-    const NOT_READ: &[&str] = &["INS_TCAL1", "COMPASS_OFS", "INS_ACC2OFFS", "INS_GYR2OFFS"];
+    #[rustfmt::skip]
+    const NOT_READ: &[&str] = &[
+        "INS_TCAL1", "COMPASS_OFS", "INS_ACC2OFFS", "INS_ACC3OFFS", "INS_GYR2OFFS", "INS_GYR3OFFS",
+    ];
     const PAGES: &[Page] = &[Page::of("ArduPilot", "ardupilot.parm")];
 
     /// # Errors

@@ -150,8 +150,9 @@ impl Foreign {
         let there = |key: &&&str| self.file.has_other_than_zero(key);
         let keys: Vec<&str> = keys.filter(there).copied().collect();
         (!keys.is_empty()).then(|| {
+            let is = if keys.len() == 1 { "is" } else { "are" };
             let (place, keys) = (&self.place, keys.join(", "));
-            format!("{place}: {keys} are not read: the calibration is what the other keys say")
+            format!("{place}: {keys} {is} not read: the calibration is what the other keys say")
         })
     }
 

@@ -39,7 +39,8 @@ pub struct Parameter {
 impl Parameter {
     /// A value in single precision.
     pub fn real(name: String, value: f64) -> Self {
-        let (value, kind) = (f64::from(value as f32), 9);
+        // A zero without a sign.
+        let (value, kind) = (f64::from(value as f32) + 0.0, 9);
         Self { name, value, kind }
     }
 

@@ -82,7 +82,12 @@ impl Target for Px4 {
         Entry::of(Sensor::Gyro, Numbers::Bias, "CAL_GYRO0_{AXIS}OFF"),
         Entry::of(Sensor::Gyro, Numbers::LeftDiagonal, "CAL_GYRO0_{AXIS}SCALE").optional(),
     ];
-    const NOT_READ: &[&str] = &["TC_G0", "TC_A0", "CAL_MAG0", "CAL_ACC1", "CAL_GYRO1"];
+    // A compass that is not there has a rotation, but no offset.
+    #[rustfmt::skip]
+    const NOT_READ: &[&str] = &[
+        "TC_G0", "TC_A0", "CAL_MAG0", "CAL_ACC1", "CAL_GYRO1", "CAL_ACC2", "CAL_GYRO2", "CAL_ACC3", "CAL_GYRO3",
+        "CAL_MAG1_XOFF", "CAL_MAG2_XOFF", "CAL_MAG3_XOFF",
+    ];
     const PAGES: &[Page] = &[Page {
         options: "--qgc",
         ..Page::of("PX4, for QGroundControl", "px4.params")

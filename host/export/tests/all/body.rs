@@ -415,6 +415,15 @@ fn formats_without_a_place_name_what_is_missing_and_complete_ones_have_it() {
     };
     let header = c::C::export(&from, &options).unwrap();
     assert!(text(&header).contains("static const imu_triad imu_body[2] = {"));
+    let mut only_mag = with([mag()]);
+    (only_mag.gyro, only_mag.accel) = (None, None);
+    let header_of_mag = c::C::export(&of(&only_mag), &options).unwrap();
+    let used = "Use: with every sample imu_triad_reading(&imu_body[IMU_MAG], raw, x).";
+    assert!(
+        text(&header_of_mag).contains(used),
+        "{}",
+        text(&header_of_mag)
+    );
     let module = Rust::export(&from, &Nothing {}).unwrap();
     assert!(text(&module).contains("pub const BODY: [FurtherTriad; 2] = ["));
 

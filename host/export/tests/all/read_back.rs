@@ -370,6 +370,31 @@ fn between_two_choices_of_the_axes_of_the_craft_y_and_z_change_their_signs() {
 }
 
 #[test]
+fn triads_that_are_not_read_are_named_and_a_zero_has_no_sign() {
+    let read = |text: &str| foreign::read(text.as_bytes(), "file").unwrap().unwrap();
+    let px4 = "CAL_ACC0_XOFF 0.1\nCAL_ACC0_YOFF 0.1\nCAL_ACC0_ZOFF 0.1\nCAL_ACC0_XSCALE 1\nCAL_ACC0_YSCALE 1\nCAL_ACC0_ZSCALE 1\n";
+    assert_eq!(
+        read(&format!("{px4}CAL_MAG2_ID 0\nCAL_MAG2_ROT -1\n")).left_out(),
+        None
+    );
+    let more = "CAL_ACC2_XOFF 0.1\nCAL_GYRO2_XOFF 0.1\nCAL_MAG1_XOFF 0.1\n";
+    let left_out = read(&format!("{px4}{more}")).left_out().unwrap();
+    let said = "file: CAL_ACC2, CAL_GYRO2, CAL_MAG1_XOFF are not read";
+    assert!(left_out.starts_with(said), "{left_out}");
+    let one = "set acc_calibration = 1,2,3,1\nset mag_calibration = 5,6,7\n";
+    let left_out = read(one).left_out().unwrap();
+    assert!(
+        left_out.starts_with("file: mag_calibration is not read"),
+        "{left_out}"
+    );
+    let (text, _) = converted(
+        "accelerometers:\n  M: [1, 0, 0, 0, 1, 0, 0, 0, 1]\ngyroscopes:\n  M: [1, 0, 0, 0, 1, 0, 0, 0, 1]\n",
+        "px4",
+    );
+    assert!(text.contains("\nCAL_GYRO0_XOFF,0\n"), "{text}");
+}
+
+#[test]
 fn what_is_missing_is_named_with_its_key() {
     let refused = |text: &str| {
         let error = foreign::read(text.as_bytes(), "cal.yaml").err();
