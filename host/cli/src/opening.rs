@@ -17,6 +17,10 @@ pub(crate) enum Opened {
 /// Opens the file at `path`. What no format knows is refused as a file of mimu.
 pub(crate) fn open(path: &Path) -> Result<Opened> {
     let bytes = std::fs::read(path).map_err(|e| Error::io(path, &e))?;
+    if bytes.is_empty() {
+        let remedy = "copy it again, or make it again";
+        return Err(Error::new(path.display(), "the file is empty", remedy));
+    }
     let is_own = |line: &str| line.starts_with("format = \"mimu-");
     let own = std::str::from_utf8(&bytes).is_ok_and(|text| text.lines().any(is_own));
     let other = match own {

@@ -71,7 +71,7 @@ impl Target for Adafruit {
     const PAGES: &[Page] = &[Page::of("Adafruit (hard and soft iron)", "calibration.h")];
 
     /// # Errors
-    /// The calibration is missing, C is singular, or the magnetometer's field has no known size.
+    /// The calibration is missing, C is singular, or those of `body::Options::microtesla`.
     fn export(from: &Sources, options: &Options) -> Result<Export> {
         let (calibration, place) = from.calibration()?;
         let mut export = Export::new::<Self>(from);
@@ -120,7 +120,10 @@ fn magnetometer(
         export.note("The calibration has no magnetometer, so nothing is written for it.");
         return Ok(None);
     };
-    let readings = options.mag.microtesla(mag, place)?;
+    let readings = options.mag.microtesla((calibration, place), mag, export)?;
+    let Some(readings) = readings else {
+        return Ok(None);
+    };
     let frame = match mag.rotation_deg {
         Some(_) => "in the frame of the gyro",
         None => "in its own frame",

@@ -5,9 +5,9 @@
 //! documentation, "IMU Temperature Calibration"; parameter list, INS_TCAL1_*.
 //!
 //! A calibration at one temperature becomes INS_ACCOFFS, INS_ACCSCAL and INS_GYROFFS (for the other units INS_ACC2OFFS, INS_ACC2SCAL, INS_GYR2OFFS
-//! and so on). ArduPilot computes `(accel - offset) * scale` and `gyro - offset` after the rotation of the sensor and before that of the board.
-//! Source: libraries/AP_InertialSensor/AP_InertialSensor_Backend.cpp, `_rotate_and_correct_accel` and `_gyro`; AP_InertialSensor.cpp for names and
-//! ranges.
+//! and so on). ArduPilot computes `(accel - offset) * scale` and `gyro - offset` after the rotation of the sensor and before that of the board, x
+//! forward, y right, z down. Source: libraries/AP_InertialSensor/AP_InertialSensor_Backend.cpp, `_rotate_and_correct_accel` and `_gyro`;
+//! AP_InertialSensor.cpp for names and ranges.
 //!
 //! A magnetometer becomes COMPASS_OFS, in milligauss, which ArduPilot adds, and the symmetric matrix of COMPASS_DIA and COMPASS_ODI (COMPASS_OFS2 and so on for
 //! the second): `matrix * ((mag + offsets) * COMPASS_SCALE)`, after the rotation of its mounting, which those numbers depend on. Source:
@@ -18,6 +18,7 @@ use mimu_recording::{Argument, Result, TriadKind};
 use nalgebra::Matrix3;
 
 use crate::convention::{Bias, Convention, Shape};
+use crate::craft_axes::CraftAxes;
 use crate::driver::name_of;
 use crate::layout::{Entry, Numbers};
 use crate::parameters::{
@@ -102,6 +103,7 @@ impl Target for ArduPilot {
     const CONTENTS: &str = "biases over temperature, or biases and scale factors at one temperature; magnetometers, further units";
     const READERS: &str = "ArduPilot";
     const CONVENTION: Convention = CONVENTION;
+    const AXES: Option<CraftAxes> = Some(CraftAxes::ForwardRightDown);
     const TAKES_BIASES: bool = true;
     const FURTHER_TRIADS: bool = true;
     const LAYOUT: &[Entry] = &[
@@ -109,7 +111,10 @@ impl Target for ArduPilot {
         Entry::of(Sensor::Accel, Numbers::LeftDiagonal, "INS_ACCSCAL_{AXIS}"),
         Entry::of(Sensor::Gyro, Numbers::Bias, "INS_GYROFFS_{AXIS}"),
     ];
-    const NOT_READ: &[&str] = &["INS_TCAL1", "COMPASS_OFS", "INS_ACC2OFFS", "INS_GYR2OFFS"];
+    #[rustfmt::skip]
+    const NOT_READ: &[&str] = &[
+        "INS_TCAL1", "COMPASS_OFS", "INS_ACC2OFFS", "INS_ACC3OFFS", "INS_GYR2OFFS", "INS_GYR3OFFS",
+    ];
     const PAGES: &[Page] = &[Page::of("ArduPilot", "ardupilot.parm")];
 
     /// # Errors

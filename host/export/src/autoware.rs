@@ -33,6 +33,7 @@ impl Target for Autoware {
         Numbers::Bias,
         "angular_velocity_offset_{axis}",
     )];
+    const NOISE_OF_READINGS: bool = true;
     const NOISE_KEYS: &[NoiseKey] = &[
         white(
             "angular_velocity_stddev_{axis}{axis}",

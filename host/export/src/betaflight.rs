@@ -13,6 +13,7 @@ use mimu::quantity::Sensor;
 use mimu_recording::error::Result;
 
 use crate::convention::{Bias, Convention, Shape};
+use crate::craft_axes::CraftAxes;
 use crate::driver::{self, positive};
 use crate::flight_codes::{CODE, CODES, MAG, codes, compass, whole};
 use crate::layout::{Entry, Numbers};
@@ -42,6 +43,7 @@ impl Target for Betaflight {
     const READERS: &str = "Betaflight";
     const CONVENTION: Convention =
         Convention::to_input(Shape::Absent, Bias::SubtractedFromReadings);
+    const AXES: Option<CraftAxes> = Some(CraftAxes::ForwardLeftUp);
     const FURTHER_TRIADS: bool = true;
     const LAYOUT: &[Entry] =
         &[Entry::of(Sensor::Accel, Numbers::Bias, "acc_calibration").scaled(0.0, CODE)];

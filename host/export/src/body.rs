@@ -141,18 +141,30 @@ pub(crate) fn readings(
 }
 
 impl Options {
-    /// Readings of a magnetometer's driver, µT.
+    /// Readings of a magnetometer's driver, µT. `None`, with a note, if the size of the field is not known: gyro and accelerometer do not depend on it.
     ///
     /// # Errors
-    /// The size of the field is not known, or C is singular.
-    pub(crate) fn microtesla(&self, mag: &BodyTriad, place: &str) -> Result<Readings> {
-        if mag.unit == FIELD {
+    /// C is singular, or the size of the field is not known and the calibration has nothing else.
+    pub(crate) fn microtesla(
+        &self,
+        (calibration, place): (&Calibration, &str),
+        mag: &BodyTriad,
+        export: &mut Export,
+    ) -> Result<Option<Readings>> {
+        if mag.unit != FIELD {
+            return readings(mag, false, self.mag_ut_per_raw, place).map(Some);
+        }
+        let problem = "its unit is that of the field, whose size is not known, and the program needs a magnetic flux density";
+        let remedy = "fit the recording again with the size of the field: mimu fit --field UT";
+        if calibration.gyro.is_none() && calibration.accel.is_none() {
             let place = format!("{place}, [[body]] {}", mag.triad);
-            let problem = "its unit is that of the field, whose size is not known, and the program needs a magnetic flux density";
-            let remedy = "fit the recording again with the size of the field: mimu fit --field UT";
             return Err(Error::new(place, problem, remedy));
         }
-        readings(mag, false, self.mag_ut_per_raw, place)
+        export.note(format!(
+            "{} is not in the file: {problem}. To have it there, {remedy}.",
+            mag.triad
+        ));
+        Ok(None)
     }
 }
 

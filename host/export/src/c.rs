@@ -143,6 +143,14 @@ impl Header<'_> {
         if !self.effects.is_empty() {
             each.push(format!("{prefix}_remove_effects(&s, rate, force)"));
         }
+        if each.is_empty()
+            && let Some(first) = self.calibration.body.first()
+        {
+            let at = format!("{prefix}_{}", first.triad).to_uppercase();
+            each.push(format!(
+                "{prefix}_triad_reading(&{prefix}_body[{at}], raw, x)"
+            ));
+        }
         format!("{calls}with every sample {}", each.join("; "))
     }
 

@@ -14,7 +14,7 @@ use mimu_recording::{RawUnit, UNNAMED};
 use crate::convention::Bias;
 use crate::keyed::Keyed;
 use crate::layout::{Found, nothing};
-use crate::{FORMATS, Format};
+use crate::{FORMATS, Format, driver};
 
 /// A file of another program.
 pub struct Foreign {
@@ -150,8 +150,9 @@ impl Foreign {
         let there = |key: &&&str| self.file.has_other_than_zero(key);
         let keys: Vec<&str> = keys.filter(there).copied().collect();
         (!keys.is_empty()).then(|| {
+            let is = if keys.len() == 1 { "is" } else { "are" };
             let (place, keys) = (&self.place, keys.join(", "));
-            format!("{place}: {keys} are not read: the calibration is what the other keys say")
+            format!("{place}: {keys} {is} not read: the calibration is what the other keys say")
         })
     }
 
@@ -209,7 +210,7 @@ impl Foreign {
         models: &PerSensor<Option<Affine<f64>>>,
         given: RawUnit,
     ) -> Result<Calibration> {
-        let frame = format!("that of {}", self.format.name);
+        let frame = self.format.frame();
         let unit = (UNNAMED, self.raw_unit(given), frame.as_str());
         Calibration::of_program(models, unit, &self.place)
     }
@@ -228,10 +229,11 @@ impl Foreign {
         key.read(&self.file, rate_hz.unwrap_or(f64::NAN))
     }
 
-    /// Its noise for other formats, without intervals; `None` if it has none.
+    /// Its noise for other formats, of calibrated readings and without intervals; `None` if it has none. Densities of a file that are those of the readings are
+    /// divided by the factors that such a file is written with.
     ///
     /// # Errors
-    /// Its numbers are those of a sample at a rate that is not known.
+    /// Its numbers are those of a sample at a rate that is not known, or its calibration is singular.
     pub fn noise(&self, rate_hz: Option<f64>) -> Result<Option<NoiseFile>> {
         let rate_hz = self.rate_hz().or(rate_hz);
         let unknown = |value: f64, unit: &str| FileCoefficient {
@@ -240,6 +242,10 @@ impl Foreign {
             lower: f64::NAN,
             upper: f64::NAN,
             unit: unit.into(),
+        };
+        let calibration = match self.is_noise_only() {
+            true => None,
+            false => Some(self.calibration(RawUnit::Si)?),
         };
         let mut channel = Vec::new();
         for sensor in Sensor::BOTH {
@@ -257,12 +263,20 @@ impl Foreign {
                 let remedy = "give a file with the noise of a unit";
                 return Err(Error::new(place, "it is not above 0", remedy));
             }
+            let calibration = calibration.as_ref();
+            let own = calibration.and_then(|of| Some((of, of.table(sensor)?)));
+            let gain = match own.filter(|_| self.format.noise_of_readings) {
+                Some((of, _)) => driver::raw(of, &self.place, sensor)?.noise_gain(),
+                None => [1.0; 3],
+            };
             for (i, axis) in AXES.iter().enumerate() {
                 channel.push(NoiseChannel {
                     name: format!("{sensor}_{axis}"),
                     unit: sensor.unit().into(),
-                    n: Some(unknown(white[i], sensor.unit())),
-                    k: walk.map(|walk| unknown(walk[i], sensor.unit())),
+                    raw_unit: own.map(|(_, table)| table.raw_unit.to_string()),
+                    scale_factor: own.map(|(_, table)| table.physical.scale_factor[i]),
+                    n: Some(unknown(white[i] / gain[i], sensor.unit())),
+                    k: walk.map(|walk| unknown(walk[i] / gain[i], sensor.unit())),
                     k_reason: Some(format!("{} has no random walk", self.place)),
                     ..NoiseChannel::default()
                 });

@@ -6,6 +6,7 @@ use mimu::calibration::Calibration;
 use mimu_recording::error::Result;
 
 use crate::convention::{Bias, Convention, Shape};
+use crate::craft_axes::{CraftAxes, rotated};
 use crate::keyed::Keyed;
 use crate::layout::{Entry, NoiseKey};
 use crate::{Export, FORMATS, Sources, layout};
@@ -60,6 +61,8 @@ pub trait Target {
     const READERS: &str;
     /// How it writes the model of a triad: unless it says otherwise C and o, as in the calibration file.
     const CONVENTION: Convention = Convention::to_input(Shape::Whole, Bias::AddedToInput);
+    /// The axes of the craft, if the program's numbers are in these.
+    const AXES: Option<CraftAxes> = None;
     /// Where the numbers of [`Self::CONVENTION`] are.
     const LAYOUT: &[Entry] = &[];
     /// Beginnings of keys with what its reader leaves out.
@@ -68,6 +71,8 @@ pub trait Target {
     const TAKES_RAW: bool = false;
     /// Where the noise is.
     const NOISE_KEYS: &[NoiseKey] = &[];
+    /// Whether its densities are those of the readings that its calibration is for; otherwise those of calibrated ones.
+    const NOISE_OF_READINGS: bool = false;
     /// Key of the messages a second.
     const RATE_KEY: Option<&str> = None;
     /// For a file that [`Keyed`] does not read: its numbers; `None` if it is another file. The second argument is its path.
@@ -115,10 +120,12 @@ pub struct Format {
     /// Its entries of the page.
     pub pages: &'static [Page],
     pub(crate) convention: Convention,
+    axes: Option<CraftAxes>,
     pub(crate) layout: &'static [Entry],
     pub(crate) not_read: &'static [&'static str],
     pub(crate) takes_raw: bool,
     pub(crate) noise_keys: &'static [NoiseKey],
+    pub(crate) noise_of_readings: bool,
     pub(crate) rate_key: Option<&'static str>,
     pub(crate) unpack: Option<Unpack>,
     pub(crate) whole: Option<Whole>,
@@ -136,10 +143,12 @@ impl Format {
             row: [T::CONTENTS, T::READERS],
             pages: T::PAGES,
             convention: T::CONVENTION,
+            axes: T::AXES,
             layout: T::LAYOUT,
             not_read: T::NOT_READ,
             takes_raw: T::TAKES_RAW,
             noise_keys: T::NOISE_KEYS,
+            noise_of_readings: T::NOISE_OF_READINGS,
             rate_key: T::RATE_KEY,
             unpack: T::UNPACK,
             whole: T::WHOLE,
@@ -150,6 +159,11 @@ impl Format {
                 Ok(Box::new(move |from: &Sources| T::export(from, &options)))
             },
         }
+    }
+
+    /// The frame of a calibration that was read from a file of it.
+    pub(crate) fn frame(&self) -> String {
+        format!("that of {}", self.name)
     }
 
     /// How many of its keys `file` has.
@@ -185,7 +199,30 @@ impl Choice {
     /// Those of [`Target::export`], or noise and calibration belong to different readings.
     pub fn export(&self, from: &Sources) -> Result<Export> {
         from.check_same_readings()?;
-        (self.make)(from)
+        let Some((calibration, place)) = from.calibration else {
+            return (self.make)(from);
+        };
+        let table = calibration.accel.as_ref().or(calibration.gyro.as_ref());
+        let is_source = |f: &&Format| table.is_some_and(|table| table.frame == f.frame());
+        let source = FORMATS.iter().find(is_source);
+        let axes = source.and_then(|source| source.axes).zip(self.format.axes);
+        let (Some(source), Some((before, after))) = (source, axes.filter(|(a, b)| a != b)) else {
+            return (self.make)(from);
+        };
+        let frame = format!("{}, rotated to {}", source.frame(), after.text());
+        let calibration = rotated(calibration, &frame, place)?;
+        let calibration = Some((&calibration, place));
+        let mut export = (self.make)(&Sources {
+            calibration,
+            ..*from
+        })?;
+        let (from, to) = (source.name, self.format.name);
+        export.note(format!(
+            "Rotated by half a turn about x, so y and z change their signs: {from} has {}, and {to} {}.",
+            before.text(),
+            after.text()
+        ));
+        Ok(export)
     }
 }
 

@@ -58,6 +58,7 @@ impl Target for Gazebo {
             "linear_acceleration/{axis}/noise/mean",
         ),
     ];
+    const NOISE_OF_READINGS: bool = true;
     const NOISE_KEYS: &[NoiseKey] = &[
         white("angular_velocity/{axis}/noise/stddev", "", Sensor::Gyro).of(NoiseOf::Deviation),
         white("linear_acceleration/{axis}/noise/stddev", "", Sensor::Accel).of(NoiseOf::Deviation),

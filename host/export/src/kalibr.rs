@@ -62,6 +62,7 @@ impl Target for Kalibr {
     const NOISE: Noise = Noise::Needed;
     const FURTHER_TRIADS: bool = true;
     const NOISE_KEYS: &[NoiseKey] = &KEYS;
+    const NOISE_OF_READINGS: bool = true;
     const RATE_KEY: Option<&str> = Some("update_rate");
     // In the frame of the accelerometer, whose right factor is the identity.
     const LAYOUT: &[Entry] = &[

@@ -13,6 +13,7 @@
 //! | [`foreign`] | files of other programs, read |
 //! | [`fitting_convention`] | which convention of a file fits a recording of its unit |
 //! | [`driver`] | readings in SI, as converted by a driver |
+//! | [`craft_axes`] | axes of the craft, and a calibration rotated between two choices of them |
 //! | [`body`] | triads beyond the first gyro and accelerometer |
 //! | [`worst_axis`] | noise for programs that have one number for three axes |
 //! | [`intrinsics`] | triangular matrices and rotations, for Kalibr and OpenVINS |
@@ -35,6 +36,7 @@ pub mod body;
 pub mod c;
 pub mod convention;
 pub mod core;
+pub mod craft_axes;
 mod degrees_per_turn;
 pub mod depthai;
 pub mod dlio;

@@ -74,6 +74,7 @@ impl Target for Matlab {
         Entry::of(Sensor::Gyro, Numbers::Left, "Gyroscope/AxesMisalignment").scaled(0.0, 0.01),
         Entry::of(Sensor::Gyro, Numbers::Bias, "Gyroscope/ConstantBias"),
     ];
+    const NOISE_OF_READINGS: bool = true;
     const NOISE_KEYS: &[NoiseKey] = &[
         white("Accelerometer/NoiseDensity", "", Sensor::Accel).in_si(ROOT_HALF),
         walk("Accelerometer/RandomWalk", "", Sensor::Accel).in_si(SQRT_2),

@@ -67,6 +67,7 @@ impl Target for OpenVins {
         Convention::to_reading(Shape::TriangleRotation(Triangle::Lower), Bias::Absent);
     const NOISE: Noise = Noise::Needed;
     const NOISE_KEYS: &[NoiseKey] = &KEYS;
+    const NOISE_OF_READINGS: bool = true;
     const RATE_KEY: Option<&str> = Some("update_rate");
     const LAYOUT: &[Entry] = &[
         Entry::of(Sensor::Gyro, Numbers::Left, "Tw"),

@@ -8,7 +8,7 @@ use std::fmt::Write as _;
 
 use clap::Args;
 use mimu::calibration::bias_cubic::{BiasCubics, Conversion};
-use mimu::{BodyTriad, Forward, PerSensor, Sensor};
+use mimu::{BodyTriad, Calibration, Forward, PerSensor, Sensor};
 use mimu_recording::{Argument, RawUnit, Result, TriadKind, TriadName};
 use nalgebra::{Matrix3, Vector3};
 use serde::Serialize;
@@ -39,7 +39,8 @@ pub struct Parameter {
 impl Parameter {
     /// A value in single precision.
     pub fn real(name: String, value: f64) -> Self {
-        let (value, kind) = (f64::from(value as f32), 9);
+        // A zero without a sign.
+        let (value, kind) = (f64::from(value as f32) + 0.0, 9);
         Self { name, value, kind }
     }
 
@@ -276,7 +277,7 @@ impl Options {
     /// The further triads that an autopilot with `most` of each kind takes; adds formulas and notes.
     ///
     /// # Errors
-    /// A magnetometer's field has no known size, its axes are mirrored, or C is singular.
+    /// A magnetometer's axes are mirrored, C is singular, or those of `body::Options::microtesla`.
     pub(crate) fn further(
         &self,
         from: &Sources,
@@ -296,7 +297,12 @@ impl Options {
         let mut all = Vec::new();
         for triad in calibration.body.iter().filter(|triad| has(triad.triad)) {
             let (offset, scale) = match triad.triad.kind {
-                TriadKind::Mag => self.compass(triad, place, compass, export)?,
+                TriadKind::Mag => {
+                    match self.compass((calibration, place), triad, compass, export)? {
+                        Some(numbers) => numbers,
+                        None => continue,
+                    }
+                }
                 _ => {
                     let readings = body::readings(triad, true, None, place)?;
                     body::note_driver(&readings, triad, false, export);
@@ -318,21 +324,23 @@ impl Options {
 
     fn compass(
         &self,
+        calibration: (&Calibration, &str),
         mag: &BodyTriad,
-        place: &str,
         compass: &Compass,
         export: &mut Export,
-    ) -> Result<(Vector3<f64>, Matrix3<f64>)> {
+    ) -> Result<Option<(Vector3<f64>, Matrix3<f64>)>> {
         let (unit, per_ut) = compass.unit;
-        let readings = self.mag.microtesla(mag, place)?;
+        let Some(readings) = self.mag.microtesla(calibration, mag, export)? else {
+            return Ok(None);
+        };
         export.formula(format!(
             "{}: x = {} in {unit}, {}; v is the driver's output, {per_ut} {unit} for a microtesla of the readings below",
             mag.triad, compass.formula, compass.symmetric
         ));
         body::note_driver(&readings, mag, self.mag.mag_ut_per_raw.is_some(), export);
         let parts = compass.convention.of(&readings)?;
-        body::note_rotation(mag, &parts.left, place, export)?;
-        Ok((per_ut * parts.bias, parts.right))
+        body::note_rotation(mag, &parts.left, calibration.1, export)?;
+        Ok(Some((per_ut * parts.bias, parts.right)))
     }
 }
 

@@ -5,8 +5,9 @@
 //! TC_*.
 //!
 //! A calibration at one temperature becomes CAL_ACCn_XOFF, CAL_ACCn_XSCALE and CAL_GYROn_XOFF, n from 0. PX4 computes `(data - thermal_offset -
-//! offset) * scale` for an accelerometer and `data - thermal_offset - offset` for a gyro, which has no scale there. Source:
-//! src/lib/sensor_calibration/Accelerometer.hpp and Gyroscope.hpp, `Correct`; src/modules/sensors/module.yaml.
+//! offset) * scale` for an accelerometer and `data - thermal_offset - offset` for a gyro, which has no scale there. The
+//! driver has rotated the data to the axes of the board, x forward, y right, z down. Source: src/lib/sensor_calibration/Accelerometer.hpp and
+//! Gyroscope.hpp, `Correct`; src/modules/sensors/module.yaml; msg/SensorAccel.msg for the axes.
 //!
 //! A magnetometer becomes CAL_MAGn_XOFF, in gauss, and the symmetric matrix of CAL_MAGn_XSCALE and CAL_MAGn_XODIAG: `rotation * (scale * (data - offset))`.
 //! The rotation is the mounting (CAL_MAGn_ROT; as Euler angles, CAL_MAGn_ROLL and so on). Source: src/lib/sensor_calibration/Magnetometer.hpp, `Correct`;
@@ -17,6 +18,7 @@ use mimu::quantity::Sensor;
 use mimu_recording::{Argument, Result, TriadKind};
 
 use crate::convention::{Bias, Convention, Shape};
+use crate::craft_axes::CraftAxes;
 use crate::layout::{Entry, Numbers};
 use crate::parameters::{CONVENTION, Compass, GIVE_FACTOR, Options, Parameter, Row, What};
 use crate::remaining::Remaining;
@@ -70,6 +72,7 @@ impl Target for Px4 {
     const CONTENTS: &str = "biases over temperature, or biases and scale factors at one temperature; magnetometers, further units";
     const READERS: &str = "PX4";
     const CONVENTION: Convention = CONVENTION;
+    const AXES: Option<CraftAxes> = Some(CraftAxes::ForwardRightDown);
     const TAKES_BIASES: bool = true;
     const FURTHER_TRIADS: bool = true;
     // Before 2020 a gyro had scale factors too.
@@ -79,7 +82,12 @@ impl Target for Px4 {
         Entry::of(Sensor::Gyro, Numbers::Bias, "CAL_GYRO0_{AXIS}OFF"),
         Entry::of(Sensor::Gyro, Numbers::LeftDiagonal, "CAL_GYRO0_{AXIS}SCALE").optional(),
     ];
-    const NOT_READ: &[&str] = &["TC_G0", "TC_A0", "CAL_MAG0", "CAL_ACC1", "CAL_GYRO1"];
+    // A compass that is not there has a rotation, but no offset.
+    #[rustfmt::skip]
+    const NOT_READ: &[&str] = &[
+        "TC_G0", "TC_A0", "CAL_MAG0", "CAL_ACC1", "CAL_GYRO1", "CAL_ACC2", "CAL_GYRO2", "CAL_ACC3", "CAL_GYRO3",
+        "CAL_MAG1_XOFF", "CAL_MAG2_XOFF", "CAL_MAG3_XOFF",
+    ];
     const PAGES: &[Page] = &[Page {
         options: "--qgc",
         ..Page::of("PX4, for QGroundControl", "px4.params")

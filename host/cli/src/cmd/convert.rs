@@ -69,7 +69,10 @@ pub fn run(args: &ConvertArgs) -> Result<()> {
     };
     let choice = format.chosen(&args.options).map_err(|e| {
         let text = e.render().to_string();
-        let problem = text.lines().next().unwrap_or_default().to_owned();
+        // The arguments that are missing follow on lines, and the usage after an empty one.
+        let lines = text.lines().map(str::trim);
+        let said: Vec<&str> = lines.take_while(|line| !line.is_empty()).collect();
+        let problem = said.join(" ").replacen("error: ", "", 1);
         let remedy = format!("see mimu export {} --help", args.to);
         Error::new("options after --", problem, remedy)
     })?;

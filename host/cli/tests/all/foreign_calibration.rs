@@ -79,6 +79,11 @@ fn a_calibration_goes_through_formats_and_comes_back() {
         )
         .contains("mimu export px4 --help")
     );
+    let error = refused(at, "convert back.toml --to inav -o x.txt");
+    says(&error, &["were not provided: --acc-1g <CODES>"]);
+    std::fs::write(at.join("empty.toml"), "").unwrap();
+    let error = refused(at, "convert empty.toml --to c -o x.h");
+    says(&error, &["empty.toml: the file is empty"]);
     let out = mimu(at, "convert back.toml --to nonsense -o x");
     assert_eq!(out.status, Some(2));
     // Noise alone.

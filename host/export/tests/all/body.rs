@@ -184,7 +184,7 @@ fn a_mirrored_compass_is_refused() {
 }
 
 #[test]
-fn a_field_without_a_size_is_refused_where_gauss_are_needed_and_taken_where_directions_are_enough()
+fn a_field_without_a_size_is_left_out_where_gauss_are_needed_and_taken_where_directions_are_enough()
 {
     let field = BodyTriad {
         unit: "field".into(),
@@ -198,11 +198,34 @@ fn a_field_without_a_size_is_refused_where_gauss_are_needed_and_taken_where_dire
         driver: driver::Options::default(),
         mag: body::Options::default(),
     };
-    for refused in [
-        Px4::export(&of(&in_field), &autopilot(None)),
-        ArduPilot::export(&of(&in_field), &autopilot(None)),
-        Adafruit::export(&of(&in_field), &adafruit),
-    ] {
+    let needs_gauss = |calibration: &Calibration| {
+        [
+            Px4::export(&of(calibration), &autopilot(None)),
+            ArduPilot::export(&of(calibration), &autopilot(None)),
+            Adafruit::export(&of(calibration), &adafruit),
+        ]
+    };
+    // Gyro and accelerometer are written as without a magnetometer.
+    for (export, without) in needs_gauss(&in_field)
+        .into_iter()
+        .zip(needs_gauss(&with([])))
+    {
+        let (export, without) = (export.unwrap(), without.unwrap());
+        let values = |export: &Export| {
+            let lines = text(export)
+                .lines()
+                .filter(|line| !line.starts_with(['#', '/']));
+            lines.map(str::to_owned).collect::<Vec<_>>()
+        };
+        assert_eq!(values(&export), values(&without));
+        assert!(values(&export).len() > 1, "{}", text(&export));
+        let said =
+            |note: &String| note.starts_with("mag is not in the file") && note.contains("--field");
+        assert!(export.notes.iter().any(said), "{:?}", export.notes);
+    }
+    let mut alone = in_field.clone();
+    (alone.gyro, alone.accel) = (None, None);
+    for refused in needs_gauss(&alone) {
         let error = refused.unwrap_err().to_string();
         assert!(
             error.contains("[[body]] mag") && error.contains("--field"),
@@ -393,6 +416,15 @@ fn formats_without_a_place_name_what_is_missing_and_complete_ones_have_it() {
     };
     let header = c::C::export(&from, &options).unwrap();
     assert!(text(&header).contains("static const imu_triad imu_body[2] = {"));
+    let mut only_mag = with([mag()]);
+    (only_mag.gyro, only_mag.accel) = (None, None);
+    let header_of_mag = c::C::export(&of(&only_mag), &options).unwrap();
+    let used = "Use: with every sample imu_triad_reading(&imu_body[IMU_MAG], raw, x).";
+    assert!(
+        text(&header_of_mag).contains(used),
+        "{}",
+        text(&header_of_mag)
+    );
     let module = Rust::export(&from, &Nothing {}).unwrap();
     assert!(text(&module).contains("pub const BODY: [FurtherTriad; 2] = ["));
 

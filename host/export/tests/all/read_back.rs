@@ -253,6 +253,147 @@ fn noise_is_read_back_in_the_densities_that_were_written() {
     }
 }
 
+/// The file of a format, converted to another, with the notes.
+fn converted(text: &str, to: &str) -> (String, Vec<String>) {
+    let file = foreign::read(text.as_bytes(), "file").unwrap().unwrap();
+    let calibration = file.calibration(RawUnit::Si).unwrap();
+    let noise = file.noise(Some(200.0)).unwrap();
+    let from = Sources {
+        calibration: Some((&calibration, "file")),
+        noise: noise.as_ref(),
+        biases: None,
+    };
+    let format = FORMATS.iter().find(|format| format.name == to).unwrap();
+    let options = match to {
+        "inav" => vec!["--acc-1g".to_owned(), "2048".to_owned()],
+        _ => Vec::new(),
+    };
+    let export = format.chosen(&options).unwrap().export(&from).unwrap();
+    (String::from_utf8(export.content).unwrap(), export.notes)
+}
+
+/// The numbers of x, y and z behind the keys `name`, `#` in place of the axis.
+fn three(text: &str, name: &str) -> [f64; 3] {
+    ["X", "Y", "Z"].map(|axis| {
+        let name = name.replace('#', axis) + ",";
+        let line = text.lines().find_map(|line| line.strip_prefix(&name));
+        line.unwrap_or_else(|| panic!("{name} in {text}"))
+            .parse()
+            .unwrap()
+    })
+}
+
+/// Densities of a Kalibr file are those of its readings, so a scale factor of 5 % leaves them as they are in another such file, and Basalt, whose densities are
+/// those of calibrated readings, gets them divided by it.
+#[test]
+fn noise_of_readings_is_kept_between_files_of_it_and_calibrated_for_the_others() {
+    let kalibr = "accelerometer_noise_density: 0.006\naccelerometer_random_walk: 0.0002\ngyroscope_noise_density: 0.0004\ngyroscope_random_walk: 4.0e-06\nupdate_rate: 200.0\n\
+                  accelerometers:\n  M:\n  - [1.05, 0.0, 0.0]\n  - [0.0, 1.05, 0.0]\n  - [0.0, 0.0, 1.05]\n\
+                  gyroscopes:\n  M:\n  - [0.99732203, 0.0, 0.0]\n  - [0.00373207, 0.99372249, 0.0]\n  - [-0.00218998, -0.00186741, 0.99919668]\n";
+    for to in ["kalibr", "openvins"] {
+        let (text, _) = converted(kalibr, to);
+        for line in [
+            "accelerometer_noise_density: 6.000000e-3 ",
+            "accelerometer_random_walk: 2.000000e-4 ",
+            "gyroscope_noise_density: 4.000000e-4 ",
+            "gyroscope_random_walk: 4.000000e-6 ",
+        ] {
+            assert!(text.contains(line), "{to}: {line}: {text}");
+        }
+    }
+    let (basalt, _) = converted(kalibr, "basalt");
+    let read: serde_json::Value = serde_json::from_str(&basalt).unwrap();
+    for (key, expected) in [
+        ("accel_noise_std", 0.006 / 1.05),
+        ("accel_bias_std", 0.0002 / 1.05),
+    ] {
+        for axis in 0..3 {
+            let found = read["value0"][key][axis].as_f64().unwrap();
+            assert!((found / expected - 1.0).abs() < 1e-9, "{key}: {found}");
+        }
+    }
+    // And back: the readings are noisier again.
+    let (back, _) = converted(&basalt, "kalibr");
+    assert!(
+        back.contains("accelerometer_noise_density: 6.000000e-3 "),
+        "{back}"
+    );
+    let (again, _) = converted(&basalt, "basalt");
+    let again: serde_json::Value = serde_json::from_str(&again).unwrap();
+    let first = |of: &serde_json::Value| of["value0"]["accel_noise_std"][0].as_f64().unwrap();
+    assert!((first(&again) / first(&read) - 1.0).abs() < 1e-12);
+}
+
+/// PX4 and ArduPilot calibrate with x forward, y right, z down, Betaflight with x forward, y left, z up, INAV on the axes of the sensor. Offsets in codes of
+/// 1/2048 g.
+#[test]
+fn between_two_choices_of_the_axes_of_the_craft_y_and_z_change_their_signs() {
+    const CODE: f64 = 9.80665 / 2048.0;
+    let codes = [1.20, -19.11, 6.95];
+    let mut px4 = String::new();
+    for (axis, code) in ["X", "Y", "Z"].into_iter().zip(codes) {
+        px4 += &format!(
+            "CAL_ACC0_{axis}OFF,{}\nCAL_ACC0_{axis}SCALE,1\n",
+            code * CODE
+        );
+        px4 += &format!("CAL_GYRO0_{axis}OFF,{}\n", 0.001 * code);
+    }
+    let is_rotated = |notes: &[String]| notes.iter().any(|note| note.starts_with("Rotated by"));
+    let (betaflight, notes) = converted(&px4, "betaflight");
+    assert!(
+        betaflight.contains("set acc_calibration = 1,19,-7,1\n"),
+        "{betaflight}"
+    );
+    assert!(
+        betaflight.contains("rotated to x forward, y left, z up"),
+        "{betaflight}"
+    );
+    assert!(is_rotated(&notes), "{notes:?}");
+    for (to, name) in [("px4", "CAL_ACC0_#OFF"), ("ardupilot", "INS_ACCOFFS_#")] {
+        let (back, notes) = converted(&betaflight, to);
+        assert!(is_rotated(&notes), "{to}: {notes:?}");
+        for (found, whole) in three(&back, name).into_iter().zip([1.0, -19.0, 7.0]) {
+            assert!((found / CODE - whole).abs() < 1e-5, "{to}: {found}");
+        }
+    }
+    // The same axes, and axes that the file does not state.
+    let (ardupilot, notes) = converted(&px4, "ardupilot");
+    assert!(!is_rotated(&notes), "{notes:?}");
+    for (name, size) in [("INS_ACCOFFS_#", CODE), ("INS_GYROFFS_#", 0.001)] {
+        for (found, code) in three(&ardupilot, name).into_iter().zip(codes) {
+            assert!((found / size - code).abs() < 1e-5, "{name}: {found}");
+        }
+    }
+    let (inav, notes) = converted(&px4, "inav");
+    assert!(inav.contains("set acczero_y = -19\n"), "{inav}");
+    assert!(!is_rotated(&notes), "{notes:?}");
+}
+
+#[test]
+fn triads_that_are_not_read_are_named_and_a_zero_has_no_sign() {
+    let read = |text: &str| foreign::read(text.as_bytes(), "file").unwrap().unwrap();
+    let px4 = "CAL_ACC0_XOFF 0.1\nCAL_ACC0_YOFF 0.1\nCAL_ACC0_ZOFF 0.1\nCAL_ACC0_XSCALE 1\nCAL_ACC0_YSCALE 1\nCAL_ACC0_ZSCALE 1\n";
+    assert_eq!(
+        read(&format!("{px4}CAL_MAG2_ID 0\nCAL_MAG2_ROT -1\n")).left_out(),
+        None
+    );
+    let more = "CAL_ACC2_XOFF 0.1\nCAL_GYRO2_XOFF 0.1\nCAL_MAG1_XOFF 0.1\n";
+    let left_out = read(&format!("{px4}{more}")).left_out().unwrap();
+    let said = "file: CAL_ACC2, CAL_GYRO2, CAL_MAG1_XOFF are not read";
+    assert!(left_out.starts_with(said), "{left_out}");
+    let one = "set acc_calibration = 1,2,3,1\nset mag_calibration = 5,6,7\n";
+    let left_out = read(one).left_out().unwrap();
+    assert!(
+        left_out.starts_with("file: mag_calibration is not read"),
+        "{left_out}"
+    );
+    let (text, _) = converted(
+        "accelerometers:\n  M: [1, 0, 0, 0, 1, 0, 0, 0, 1]\ngyroscopes:\n  M: [1, 0, 0, 0, 1, 0, 0, 0, 1]\n",
+        "px4",
+    );
+    assert!(text.contains("\nCAL_GYRO0_XOFF,0\n"), "{text}");
+}
+
 #[test]
 fn what_is_missing_is_named_with_its_key() {
     let refused = |text: &str| {
