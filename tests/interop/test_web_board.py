@@ -173,15 +173,15 @@ def test_a_session_with_whole_turns_counts_them_and_says_what_one_is_read_as(usb
         assert calibration["gyro"]["interval_C"][i][i] < 1e-3 * abs(calibration["gyro"]["C"][i][i])
 
 
-# A phone lies beside the board for twelve seconds, when the session has had most of its poses.
+# A phone lies beside the board for ten seconds, when the session has had most of its poses.
 FIELD = """[field]
 size_ut = 50.0
 dip_deg = 65.0
 [[field.magnet]]
 at_m = [0.25, 0.0, 0.05]
 moment_am2 = [3.0, 0.0, 0.0]
-from_s = 100.0
-to_s = 112.0
+from_s = 105.0
+to_s = 115.0
 """
 
 

@@ -17,6 +17,9 @@ use crate::{FEWEST, judge};
 
 /// A smaller departure is not worth a person's attention, as a share of the field: it moves its direction by less than 2 degrees.
 const LEAST: f64 = 0.03;
+/// Rests from which on the field is looked at although its direction is not determined: an undisturbed one is after nine to twelve. Errors of its size are not
+/// hidden by that, since what is open in a fit makes its residuals smaller.
+const MANY_RESTS: usize = 14;
 
 /// The field of a body by its poses so far, in units of its size.
 #[derive(Debug, Clone)]
@@ -26,6 +29,8 @@ pub struct FieldSoFar {
     covariance: SMatrix<f64, 12, 12>,
     /// Raw specific force to SI.
     accel: Affine<f64>,
+    /// Whether other poses can be judged by it.
+    is_determined: bool,
     /// Of its size and of its part along up, at the rests so far: median and scatter.
     at_rest: [[f64; 2]; 2],
     /// Part along up.
@@ -44,7 +49,7 @@ pub struct Departure {
 }
 
 impl FieldSoFar {
-    /// Of a recording with a magnetometer, whose gyro and accelerometer have the calibration `unit`. `None` until its poses determine the field.
+    /// Of a recording with a magnetometer, whose gyro and accelerometer have the calibration `unit`. `None` until its poses are enough.
     ///
     /// # Errors
     /// The samples cannot be read.
@@ -60,8 +65,13 @@ impl FieldSoFar {
             return Ok(None);
         }
         let field = Field::of(&raw, motion, &unit.rests, (1.0, unit.rate_bias), None);
-        let determined = field.filter(|f| judge::determines(f).is_ok() && f.rests >= FEWEST_RESTS);
-        Ok(determined.map(|field| Self::by(&field, accel)))
+        let found = field.map(|field| (judge::determines(&field).is_ok(), field));
+        let enough = |is: bool| if is { FEWEST_RESTS } else { MANY_RESTS };
+        let found = found.filter(|(is, field)| field.rests >= enough(*is));
+        Ok(found.map(|(is, field)| Self {
+            is_determined: is,
+            ..Self::by(&field, accel)
+        }))
     }
 
     fn by(field: &Field, accel: Affine<f64>) -> Self {
@@ -77,6 +87,7 @@ impl FieldSoFar {
             calibration: field.relation.calibration(),
             covariance: own * wider.powi(2),
             accel,
+            is_determined: true,
             // The error of the part along up is expected minus measured.
             along_up: -field.sine_of_dip() - levels[1][0],
             at_rest: levels,
@@ -88,7 +99,7 @@ impl FieldSoFar {
         self.at_rest[0][1]
     }
 
-    /// The departure of raw readings within a second; `force`: mean raw specific force, if the body rests. `None` without readings.
+    /// The departure of raw readings within a second; `force`: mean raw specific force, if the body rests. `None` without readings, and where the field is not determined.
     pub fn departure(
         &self,
         readings: &[[f64; 3]],
@@ -124,7 +135,7 @@ impl FieldSoFar {
             let tolerated = tolerated(self.at_rest[1][1], variance(&mean, &up));
             departure.ratio[1] = (along - self.along_up).abs() / tolerated;
         }
-        (count > 0.0).then_some(departure)
+        (count > 0.0 && self.is_determined).then_some(departure)
     }
 }
 

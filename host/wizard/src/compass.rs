@@ -19,7 +19,7 @@ const GROWN: f64 = 1.2;
 /// Ratio below which a departure is over: less than where it began, so that it does not come and go.
 const OVER: f64 = 0.6;
 /// Scatter of the size of the field from pose to pose, as a share of it, beyond which no pose is a measure of the others.
-const VARIES: f64 = 0.03;
+const VARIES: f64 = 0.02;
 
 /// Readings of the last second, and the field so far.
 #[derive(Debug, Default)]
