@@ -35,6 +35,29 @@ pub struct Guess {
     pub calendar: bool,
 }
 
+impl Guess {
+    /// Takes the units beside the names of the columns, in a row of units, or in the names themselves.
+    pub(super) fn take_named_units(&mut self, names: &[String], units: &[String]) {
+        let said = |wanted: &[&str]| -> Vec<String> {
+            let all = names.iter().enumerate().zip(&self.roles);
+            let own = all.filter(|(_, role)| wanted.contains(*role));
+            own.map(|((k, name), _)| match units.get(k) {
+                Some(unit) if !unit.is_empty() => format!("{name} [{unit}]"),
+                _ => name.clone(),
+            })
+            .collect()
+        };
+        let [gyro, accel, mag, time] = [&GYRO[..], &ACCEL, &MAG, &["t_s"]].map(said);
+        self.gyro_unit = alike(&gyro, rate_unit);
+        self.accel_unit = alike(&accel, force_unit);
+        self.mag_unit = alike(&mag, field_unit);
+        self.time_unit = alike(&time, clock_unit);
+        if self.grows && self.time_unit.is_none() {
+            self.time_unit = alike(&time, clock_unit_within);
+        }
+    }
+}
+
 const GYRO: [&str; 3] = ["gyro_x", "gyro_y", "gyro_z"];
 const ACCEL: [&str; 3] = ["accel_x", "accel_y", "accel_z"];
 const MAG: [&str; 3] = ["mag_x", "mag_y", "mag_z"];
@@ -74,23 +97,7 @@ pub fn guess(
             guess.roles[other] = "temp_c";
         }
     }
-    // The unit beside a name, in a row of units, or in the name itself.
-    let said = |wanted: &[&str]| -> Vec<String> {
-        let all = names.iter().enumerate().zip(&guess.roles);
-        let own = all.filter(|(_, role)| wanted.contains(*role));
-        own.map(|((k, name), _)| match units.get(k) {
-            Some(unit) if !unit.is_empty() => format!("{name} [{unit}]"),
-            _ => name.clone(),
-        })
-        .collect()
-    };
-    guess.gyro_unit = alike(&said(&GYRO), rate_unit);
-    guess.accel_unit = alike(&said(&ACCEL), force_unit);
-    guess.mag_unit = alike(&said(&MAG), field_unit);
-    guess.time_unit = alike(&said(&["t_s"]), clock_unit);
-    if guess.grows && guess.time_unit.is_none() {
-        guess.time_unit = alike(&said(&["t_s"]), clock_unit_within);
-    }
+    guess.take_named_units(names, units);
     guess
 }
 
