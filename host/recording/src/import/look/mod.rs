@@ -11,7 +11,7 @@ mod triads;
 
 use std::path::{Path, PathBuf};
 
-use self::guess::grows_evenly;
+use self::guess::{MAG, grows_evenly};
 pub use guess::{Guess, Units, guess};
 
 use super::assignment::{ColumnList, Role};
@@ -80,6 +80,10 @@ impl FileLook {
             let separator = self
                 .separator
                 .map(|separator| format!(" --separator '{separator}'"));
+            let mut roles = roles.clone();
+            for (at, role) in self.guess.may_be_mag.into_iter().flatten().zip(MAG) {
+                roles[at] = role;
+            }
             return format!("{}{}", roles.join(","), separator.unwrap_or_default());
         }
         let mut items: Vec<String> = used
@@ -600,6 +604,8 @@ pub fn guess_preview(
         guess.roles = columns.roles_among(&seen.names);
         (guess.grows, guess.by_readings) = (false, false);
         guess.take_named_units(&seen.names, &seen.units);
+    } else if guess.by_readings {
+        guess.compare_magnitudes(&rows);
     }
     // A date or a time of day is in s, whatever its name says.
     if clock.is_some_and(|at| guess.roles.get(at) == Some(&"t_s")) {

@@ -396,7 +396,7 @@ fn units_are_found_for_given_columns_as_for_those_that_the_names_say() {
             std::slice::from_ref(&both),
             vec![format!("t_s,{force},{rate}")],
         ),
-        (&apart, each.to_vec()),
+        (&apart[..], each.to_vec()),
     ] {
         let look = look(files, &columns);
         let units = [&look.accel, &look.gyro].map(|found| found.as_ref().and_then(|f| f.unit));
@@ -416,4 +416,29 @@ fn units_are_found_for_given_columns_as_for_those_that_the_names_say() {
     );
     let magnetometer = look(&apart[..1], &["t_s,mag_x,mag_y,mag_z".to_owned()]);
     assert_eq!(magnetometer.raw_unit, None);
+}
+
+#[test]
+fn without_names_the_triad_of_steady_magnitude_is_the_accelerometer_and_a_third_may_be_a_field() {
+    // A gyro that turns by 34 deg/s and more reads larger numbers than an accelerometer in g, or than one in coarse counts.
+    let write = |counts: f64| {
+        look("", move |i, t, f, w| {
+            let fast = if (200..400).contains(&i) { 60.0 } else { 1.0 };
+            let field = [120.0 + (i % 3) as f64, -30.0, 200.0];
+            let force = joined(f.map(|v| (v * counts / G * 1e3).round() / 1e3), 1.0, ",");
+            let rate = joined(w.map(|v| v.to_degrees() * fast * counts), 1.0, ",");
+            format!("{t:.2},{force},{rate},{}\n", joined(field, 1.0, ","))
+        })
+    };
+    let in_g = write(1.0);
+    assert_eq!(roles(&in_g), TIMED);
+    assert_eq!(in_g.accel.as_ref().and_then(|found| found.unit), Some("g"));
+    let unknown = write(2.5);
+    let says = asked(&unknown);
+    let list = TIMED.join(",") + ",mag_x,mag_y,mag_z";
+    assert!(says.contains(&format!("--columns {list} ")), "{says}");
+    assert!(
+        says.contains("the usual magnitude of specific force is 2.5"),
+        "{says}"
+    );
 }
