@@ -20,7 +20,7 @@ use mimu::prepared::Prepared;
 use mimu::signal::stillness::{DwellSearch, STILL_FACTOR, Steps};
 use mimu_recording::error::{Error, Result};
 use mimu_recording::look::{Guess, Units, guess_preview};
-use mimu_recording::{ColumnList, Preset, Preview, Recording, preview};
+use mimu_recording::{Preset, Preview, Recording, preview};
 use serde::Serialize;
 
 /// Rows of a file that the page shows.
@@ -106,10 +106,10 @@ fn of_columns(paths: &[PathBuf]) -> Result<Dropped> {
     for (k, path) in paths.iter().enumerate() {
         let mut preview = preview(path, None, JUDGED)?;
         let file = path.file_name().unwrap_or_default().to_string_lossy();
-        let (mut guess, rows) = guess_preview(&file, &preview);
+        let (mut guess, rows) = guess_preview(&file, &preview, None);
         preview.rows.truncate(SHOWN);
         if let Some(list) = chosen.as_ref().and_then(|chosen| chosen.columns.get(k)) {
-            guess.roles = roles(list, &preview.names);
+            guess.roles = list.roles_among(&preview.names);
         }
         files.push(DroppedFile {
             file: file.into_owned(),
@@ -135,23 +135,6 @@ fn of_columns(paths: &[PathBuf]) -> Result<Dropped> {
         files,
         units,
     })
-}
-
-/// Role of each column that a preset has chosen.
-fn roles(list: &ColumnList, names: &[String]) -> Vec<&'static str> {
-    match list {
-        ColumnList::ByPosition(items) => {
-            let role = |role: &Option<mimu_recording::Role>| role.map_or("-", |role| role.name());
-            items.iter().map(role).collect()
-        }
-        ColumnList::ByName(items) => {
-            let role = |name: &String| items.iter().find(|(_, of)| of == name);
-            names
-                .iter()
-                .map(|name| role(name).map_or("-", |(role, _)| role.name()))
-                .collect()
-        }
-    }
 }
 
 /// What the page shows of a recording.

@@ -99,23 +99,19 @@ fn faces(args: &ImportArgs) -> Result<(Vec<PathBuf>, Vec<Face>)> {
     Ok(both.into_iter().map(|(face, path)| (path, face)).unzip())
 }
 
-/// Looks at files whose columns nobody has named, and asks on a terminal about what they do not show.
+/// Looks at files whose columns or units nobody has named, and asks on a terminal about what they do not show.
 ///
 /// # Errors
 /// What is still open, all at once, with the command to complete.
-fn look_at(args: &mut ImportArgs, files: &[PathBuf]) -> Result<Option<Look>> {
+fn look_at(args: &mut ImportArgs, files: &[PathBuf]) -> Result<Look> {
     loop {
         let look = look(args, files)?;
         let Some(refusal) = look.refusal(&files[0], &typed(files)) else {
-            return Ok(Some(look));
+            return Ok(look);
         };
         let person = std::io::stdin().is_terminal() && std::io::stderr().is_terminal();
         if !person || !ask(args, &look)? {
             return Err(refusal);
-        }
-        // The person has named the columns, so there is nothing to look for.
-        if !args.log.columns.is_empty() {
-            return Ok(None);
         }
     }
 }
@@ -188,7 +184,7 @@ fn look(args: &ImportArgs, files: &[PathBuf]) -> Result<Look> {
         true => &files[..files.len().min(1)],
         false => files,
     };
-    Look::at(together, args.log.separator, &given)
+    Look::with_columns(together, &args.log.columns, args.log.separator, &given)
 }
 
 /// Unit of readings whose columns are given, by `--units`; their conversion is added to the factors.
@@ -255,8 +251,10 @@ fn gravity_of(args: &ImportArgs, reference: Reference) -> (f64, Option<String>) 
 
 /// Takes over what a look at the files has found, where the command leaves it open.
 fn take_look(args: &mut ImportArgs, look: &Look, faces: bool) {
+    if args.log.columns.is_empty() {
+        args.log.columns = look.columns();
+    }
     // One list holds for all files that follow one another.
-    args.log.columns = look.columns();
     if args.sequence || faces {
         args.log.columns.truncate(1);
     }
@@ -298,12 +296,11 @@ pub(crate) fn imported(mut args: ImportArgs) -> Result<(ImportSummary, ImportOpt
         (named, _) => Preset::choose(*named, &files, args.log.separator)?,
     };
     let logs = files.iter().all(|file| is_log(file));
-    let looked = match (
-        chosen.is_some() || logs || args.log.means,
-        args.log.columns.is_empty(),
-    ) {
-        (false, true) => look_at(&mut args, &files)?,
-        _ => None,
+    let unit_given = args.log.units.is_some() || args.log.raw_unit.is_some();
+    let to_look_at = args.log.columns.is_empty() || !unit_given;
+    let looked = match chosen.is_some() || logs || args.log.means || !to_look_at {
+        false => Some(look_at(&mut args, &files)?),
+        true => None,
     };
     let by_units = match &looked {
         Some(_) => None,

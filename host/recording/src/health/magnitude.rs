@@ -59,7 +59,8 @@ pub fn accel_gain(times: f64, gravity_mps2: f64) -> Option<Finding> {
 /// The finding about an accelerometer in SI whose usual magnitude, biases included, is `size`.
 pub fn accel_at_rest(size: f64, gravity_mps2: f64) -> Option<Finding> {
     let times = size / gravity_mps2;
-    if times < NO_GRAVITY {
+    let of_another_unit = accel_cause(times, gravity_mps2) != words::UNKNOWN;
+    if times < NO_GRAVITY && !of_another_unit {
         return Some(Finding::new("accel", 0, Fault::NoGravity { size }));
     }
     not_si("accel", true, times, accel_cause(times, gravity_mps2))
@@ -71,6 +72,10 @@ fn accel_cause(times: f64, gravity_mps2: f64) -> Cause {
         _ if near(1.0 / gravity_mps2) => words::IN_G,
         _ if near(1000.0 / gravity_mps2) => words::IN_MG,
         _ if near(gravity_mps2) => words::GRAVITY_TWICE,
+        // Without gravity any magnitude is possible, so the limits are narrower.
+        _ if (0.95..1.05).contains(&(1e3 * times)) => words::G_AS_MG,
+        _ if (0.95..1.05).contains(&(1e3 * times / gravity_mps2)) => words::SI_AS_MG,
+        _ if near(1e3) => words::MG_AS_G,
         _ => words::UNKNOWN,
     }
 }

@@ -56,6 +56,18 @@ pub(super) const GRAVITY_TWICE: Cause = cause(
     "they were multiplied by gravity twice",
     "leave one factor out",
 );
+pub(super) const G_AS_MG: Cause = cause(
+    "they were taken for mg, and are in g",
+    "import them in g: --units g",
+);
+pub(super) const SI_AS_MG: Cause = cause(
+    "they were taken for mg, and are in m/s²",
+    "import them in m/s²: --units m/s2",
+);
+pub(super) const MG_AS_G: Cause = cause(
+    "they were taken for g, and are in mg",
+    "import them in mg: --units mg",
+);
 pub(super) const UNKNOWN: Cause = cause(
     "the unit is another one, or the range of the part",
     "check the unit, and the range that the part was set to; counts need another raw unit",

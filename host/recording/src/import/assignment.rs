@@ -90,6 +90,20 @@ impl ColumnList {
             ColumnList::ByName(items) => items.iter().map(|(role, _)| *role).collect(),
         }
     }
+
+    /// The name of the role of each column of a file whose header has these `names`; `-` for those that are skipped.
+    pub fn roles_among(&self, names: &[String]) -> Vec<&'static str> {
+        let roles: Vec<Option<Role>> = match self {
+            ColumnList::ByPosition(items) => items.clone(),
+            ColumnList::ByName(items) => {
+                let of = |name: &String| items.iter().find(|(_, own)| own == name);
+                let roles = names.iter().map(|name| of(name).map(|(role, _)| *role));
+                roles.collect()
+            }
+        };
+        let names = roles.into_iter().map(|role| role.map_or("-", Role::name));
+        names.collect()
+    }
 }
 
 impl FromStr for ColumnList {

@@ -13,8 +13,10 @@ use crate::batch::Batch;
 use crate::columns::{Column, Columns, Layout};
 use crate::declared::{RawUnit, Reference};
 use crate::error::{Argument, Error, Result};
-use crate::health::Fault;
+use crate::health::{Constant, Fault, Finding};
 use crate::manifest::Manifest;
+use crate::triad_name::TriadName;
+use crate::triads::Triads;
 use crate::writer::Writer;
 
 /// Rows that are written at a time.
@@ -29,6 +31,8 @@ const SLOWEST_HZ: f64 = 4.0;
 pub(super) struct LeftOut {
     /// Whether gyro and accelerometer read only zeros.
     pub sensors: [bool; 2],
+    /// Further triads that read only zeros.
+    pub triads: Triads,
     /// Whether the thermometer reads only zeros.
     pub thermometer: bool,
     /// Whether zeros of the thermometer are missing answers.
@@ -154,6 +158,7 @@ impl Files {
         let zeros = |fault| any(&|file| file.seen.zero_temperatures() == Some(fault));
         LeftOut {
             sensors: [0, 1].map(|s| any(&|file| file.seen.not_connected()[s].is_some())),
+            triads: self.all().flat_map(zero_triads).collect(),
             thermometer: zeros(Fault::NoThermometer),
             zero_temperatures: zeros(Fault::SilentThermometer),
         }
@@ -187,6 +192,7 @@ impl Files {
         }
         let kept = |column: &Column| match column {
             Column::Raw(c) => !left_out.sensors[c / 3],
+            Column::More(triad, _) => !left_out.triads.contains(*triad),
             Column::Temperature => !left_out.thermometer,
             _ => true,
         };
@@ -302,6 +308,10 @@ impl Files {
         };
         for file in self.all() {
             summary.add(file);
+            let dead = zero_triads(file).filter(|triad| !columns.more.contains(*triad));
+            let found = Finding::of_all(0, Fault::NotConnected);
+            let said = dead.map(|triad| format!("{}: {triad}: {found}", file_name(&file.path)));
+            summary.warnings.extend(said);
             if options.raw_unit == RawUnit::Si {
                 let place = file_name(&file.path);
                 let found = file.seen.wrong_unit(options.gravity_mps2);
@@ -332,6 +342,20 @@ impl Files {
     pub fn interpolates(&self) -> bool {
         self.resampled || !self.others.is_empty()
     }
+}
+
+/// The further triads of `file` that read 0 in all rows.
+fn zero_triads(file: &Source) -> impl Iterator<Item = TriadName> {
+    let zero = |column: Column| {
+        let at = file.columns.iter().position(|own| *own == column);
+        let read = at.map(|at| Constant::of(file.values[at].iter().copied()));
+        read.is_some_and(|read| read.is_zero() && !read.is_empty())
+    };
+    let triads = file.columns.iter().filter_map(|column| match column {
+        Column::More(triad, 0) => Some(*triad),
+        _ => None,
+    });
+    triads.filter(move |triad| (0..3).all(|axis| zero(Column::of(*triad, axis))))
 }
 
 /// The steps of rows at these times, if a longer pause than `gap_s` begins another.

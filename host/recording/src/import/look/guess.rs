@@ -1,7 +1,8 @@
 //! The roles of the columns of a file, by their names; without names by the readings.
 //!
 //! Without names, the first column that only grows is the time. Of two triads, the one with larger readings is the accelerometer, because gravity is
-//! large compared with the rate of a unit at rest. This may be wrong for readings with a large bias, so a person has to check it.
+//! large compared with the rate of a unit at rest. This is wrong for a gyro that turns fast or has a large bias. The magnitude of its readings then
+//! varies, and that of gravity hardly does.
 
 use serde::Serialize;
 
@@ -27,6 +28,9 @@ pub struct Guess {
     pub time_unit: Option<Decimal>,
     /// Whether the roles follow from the readings alone.
     pub by_readings: bool,
+    /// Columns of a file without names that may be a magnetometer: they are offered to a person.
+    #[serde(skip)]
+    pub may_be_mag: Option<[usize; 3]>,
     /// Whether a column was taken for the time because it grows evenly, under whatever name.
     #[serde(skip)]
     pub grows: bool,
@@ -35,9 +39,78 @@ pub struct Guess {
     pub calendar: bool,
 }
 
+/// Least variation of the magnitude of a gyro's readings in a log in which a unit turns and rests: it was 29 to 130 in five logs, and 0.02 to 0.9 of
+/// their accelerometers.
+const VARIES: f64 = 3.0;
+/// Least ratio of the two for an exchange.
+const STEADIER: f64 = 10.0;
+/// Largest variation for a magnetometer: without calibration it was 0.14 to 1.15.
+const FIELD_VARIES: f64 = 1.5;
+
+/// Difference between the upper and lower tenth of the magnitudes of a triad, relative to their median.
+fn variation(rows: &[Vec<f64>], at: [usize; 3]) -> Option<f64> {
+    let cell = |row: &Vec<f64>, at: usize| row.get(at).copied().unwrap_or(f64::NAN);
+    let sizes = rows.iter().map(|row| at.map(|k| cell(row, k)));
+    let sizes = sizes.map(|[x, y, z]| x.hypot(y).hypot(z));
+    let mut sizes: Vec<f64> = sizes.filter(|size| size.is_finite()).collect();
+    sizes.sort_by(f64::total_cmp);
+    let tenth = sizes.len() / 10;
+    (tenth > 0).then(|| {
+        let [low, high] = [sizes[tenth], sizes[sizes.len() - 1 - tenth]];
+        (high - low) / sizes[sizes.len() / 2]
+    })
+}
+
+impl Guess {
+    /// Exchanges gyro and accelerometer of a file without names if only this makes gravity steady in all its `rows`, and looks for a magnetometer.
+    pub(super) fn compare_magnitudes(&mut self, rows: &[Vec<f64>]) {
+        let position = |role: &str| self.roles.iter().position(|own| *own == role);
+        let of = |triad: [&str; 3]| match triad.map(position) {
+            [Some(x), Some(y), Some(z)] => Some([x, y, z]),
+            _ => None,
+        };
+        let (Some(gyro), Some(accel)) = (of(GYRO), of(ACCEL)) else {
+            return;
+        };
+        let behind = gyro[2].max(accel[2]) + 1;
+        if let Ok(rest) = <[usize; 3]>::try_from(Vec::from_iter(behind..self.roles.len())) {
+            let field = variation(rows, rest).filter(|v| *v > 0.0 && *v < FIELD_VARIES);
+            self.may_be_mag = field.map(|_| rest);
+        }
+        if let [Some(steady), Some(varied)] = [gyro, accel].map(|at| variation(rows, at))
+            && varied > VARIES.max(STEADIER * steady)
+        {
+            for axis in 0..3 {
+                self.roles.swap(gyro[axis], accel[axis]);
+            }
+        }
+    }
+
+    /// Takes the units beside the names of the columns, in a row of units, or in the names themselves.
+    pub(super) fn take_named_units(&mut self, names: &[String], units: &[String]) {
+        let said = |wanted: &[&str]| -> Vec<String> {
+            let all = names.iter().enumerate().zip(&self.roles);
+            let own = all.filter(|(_, role)| wanted.contains(*role));
+            own.map(|((k, name), _)| match units.get(k) {
+                Some(unit) if !unit.is_empty() => format!("{name} [{unit}]"),
+                _ => name.clone(),
+            })
+            .collect()
+        };
+        let [gyro, accel, mag, time] = [&GYRO[..], &ACCEL, &MAG, &["t_s"]].map(said);
+        self.gyro_unit = alike(&gyro, rate_unit);
+        self.accel_unit = alike(&accel, force_unit);
+        self.mag_unit = alike(&mag, field_unit);
+        self.time_unit = alike(&time, clock_unit);
+        if self.grows && self.time_unit.is_none() {
+            self.time_unit = alike(&time, clock_unit_within);
+        }
+    }
+}
+
 const GYRO: [&str; 3] = ["gyro_x", "gyro_y", "gyro_z"];
 const ACCEL: [&str; 3] = ["accel_x", "accel_y", "accel_z"];
-const MAG: [&str; 3] = ["mag_x", "mag_y", "mag_z"];
+pub(super) const MAG: [&str; 3] = ["mag_x", "mag_y", "mag_z"];
 
 /// Guesses the columns of the file called `file` from these names, the units in a row of their own, and the first rows; `clock` is the column of dates or
 /// times of day.
@@ -74,23 +147,7 @@ pub fn guess(
             guess.roles[other] = "temp_c";
         }
     }
-    // The unit beside a name, in a row of units, or in the name itself.
-    let said = |wanted: &[&str]| -> Vec<String> {
-        let all = names.iter().enumerate().zip(&guess.roles);
-        let own = all.filter(|(_, role)| wanted.contains(*role));
-        own.map(|((k, name), _)| match units.get(k) {
-            Some(unit) if !unit.is_empty() => format!("{name} [{unit}]"),
-            _ => name.clone(),
-        })
-        .collect()
-    };
-    guess.gyro_unit = alike(&said(&GYRO), rate_unit);
-    guess.accel_unit = alike(&said(&ACCEL), force_unit);
-    guess.mag_unit = alike(&said(&MAG), field_unit);
-    guess.time_unit = alike(&said(&["t_s"]), clock_unit);
-    if guess.grows && guess.time_unit.is_none() {
-        guess.time_unit = alike(&said(&["t_s"]), clock_unit_within);
-    }
+    guess.take_named_units(names, units);
     guess
 }
 

@@ -11,7 +11,7 @@ mod triads;
 
 use std::path::{Path, PathBuf};
 
-use self::guess::grows_evenly;
+use self::guess::{MAG, grows_evenly};
 pub use guess::{Guess, Units, guess};
 
 use super::assignment::{ColumnList, Role};
@@ -80,6 +80,10 @@ impl FileLook {
             let separator = self
                 .separator
                 .map(|separator| format!(" --separator '{separator}'"));
+            let mut roles = roles.clone();
+            for (at, role) in self.guess.may_be_mag.into_iter().flatten().zip(MAG) {
+                roles[at] = role;
+            }
             return format!("{}{}", roles.join(","), separator.unwrap_or_default());
         }
         let mut items: Vec<String> = used
@@ -155,10 +159,24 @@ impl Look {
     /// # Errors
     /// A file that cannot be read, or has no line of numbers.
     pub fn at(files: &[PathBuf], separator: Option<Separator>, given: &Given) -> Result<Self> {
+        Self::with_columns(files, &[], separator, given)
+    }
+
+    /// The same for files with these `columns`, one list for each or one for all; only the units are then open. None: they are looked for too.
+    ///
+    /// # Errors
+    /// As [`Self::at`].
+    pub fn with_columns(
+        files: &[PathBuf],
+        columns: &[ColumnList],
+        separator: Option<Separator>,
+        given: &Given,
+    ) -> Result<Self> {
         let (mut looks, mut numbers) = (Vec::new(), Vec::new());
-        for path in files {
+        for (k, path) in files.iter().enumerate() {
             let seen = preview(path, separator, ROWS)?;
-            let (mut guess, rows) = guess_preview(&file_name(path), &seen);
+            let list = columns.get(k).or(columns.last());
+            let (mut guess, rows) = guess_preview(&file_name(path), &seen, list);
             if !guess.calendar {
                 guess.time_unit = given.time_unit.or(guess.time_unit);
             }
@@ -171,7 +189,9 @@ impl Look {
             });
             numbers.push(rows);
         }
-        take_triads_once(&mut looks);
+        if columns.is_empty() {
+            take_triads_once(&mut looks);
+        }
         let guesses: Vec<&Guess> = looks.iter().map(|look| &look.guess).collect();
         let units = Units::of(&guesses, &numbers);
         let mut look = Self {
@@ -182,8 +202,12 @@ impl Look {
             scales: Vec::new(),
             questions: Vec::new(),
         };
-        look.take_columns(&numbers, given);
-        look.take_units(given);
+        if columns.is_empty() {
+            look.take_columns(&numbers, given);
+        }
+        if columns.is_empty() || look.gyro.is_some() || look.accel.is_some() {
+            look.take_units(given);
+        }
         Ok(look)
     }
 
@@ -561,8 +585,12 @@ fn take_triads_once(looks: &mut [FileLook]) {
     }
 }
 
-/// The roles of the columns of a file called `file`, and its numbers, in which the times go on.
-pub fn guess_preview(file: &str, seen: &Preview) -> (Guess, Vec<Vec<f64>>) {
+/// The roles of the columns of a file called `file`, by `columns` if they are given, and its numbers, in which the times go on.
+pub fn guess_preview(
+    file: &str,
+    seen: &Preview,
+    columns: Option<&ColumnList>,
+) -> (Guess, Vec<Vec<f64>>) {
     let numbers = |row: &Vec<String>| row.iter().map(|cell| number(cell)).collect();
     let mut rows: Vec<Vec<f64>> = seen.rows.iter().map(numbers).collect();
     let is_clock = |cell: &String| calendar_time(cell.as_bytes()).is_some();
@@ -572,8 +600,15 @@ pub fn guess_preview(file: &str, seen: &Preview) -> (Guess, Vec<Vec<f64>>) {
         .and_then(|row| row.iter().position(is_clock));
     let judged = &rows[..rows.len().min(JUDGED)];
     let mut guess = guess(file, &seen.names, &seen.units, judged, clock);
+    if let Some(columns) = columns {
+        guess.roles = columns.roles_among(&seen.names);
+        (guess.grows, guess.by_readings) = (false, false);
+        guess.take_named_units(&seen.names, &seen.units);
+    } else if guess.by_readings {
+        guess.compare_magnitudes(&rows);
+    }
     // A date or a time of day is in s, whatever its name says.
-    if clock.is_some_and(|at| guess.roles[at] == "t_s") {
+    if clock.is_some_and(|at| guess.roles.get(at) == Some(&"t_s")) {
         guess.time_unit = None;
         guess.calendar = true;
     }

@@ -356,3 +356,89 @@ fn two_files_with_the_names_of_their_sensors_need_no_names_of_columns() {
         ["t_s", "gyro_x", "gyro_y", "gyro_z"]
     );
 }
+
+#[test]
+fn units_are_found_for_given_columns_as_for_those_that_the_names_say() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |file: &str, row: &dyn Fn(f64, [f64; 3], [f64; 3]) -> String| {
+        let path = folder.path().join(file);
+        let rows = samples().into_iter().map(|(t, f, w)| row(t, f, w));
+        std::fs::write(&path, rows.collect::<String>()).unwrap();
+        path
+    };
+    let degrees = 1f64.to_degrees();
+    let both = write("log.csv", &|t, f, w| {
+        let head = if t == 0.0 { "when,a,b,c,d,e,f\n" } else { "" };
+        let [force, rate] = [joined(f, 1.0 / G, ","), joined(w, degrees, ",")];
+        format!("{head}{t:.2},{force},{rate}\n")
+    });
+    let one = |file: &str, force: bool| {
+        write(file, &|t, f, w| {
+            let values = if force {
+                joined(f, 1.0 / G, ",")
+            } else {
+                joined(w, degrees, ",")
+            };
+            format!("{t:.2},{values}\n")
+        })
+    };
+    let apart = [one("1.csv", true), one("2.csv", false)];
+    let [force, rate] = ["accel_x,accel_y,accel_z", "gyro_x,gyro_y,gyro_z"];
+    let by_name = "t_s=when,accel_x=a,accel_y=b,accel_z=c,gyro_x=d,gyro_y=e,gyro_z=f".to_owned();
+    let look = |files: &[PathBuf], columns: &[String]| {
+        let columns: Vec<ColumnList> = columns.iter().map(|list| list.parse().unwrap()).collect();
+        Look::with_columns(files, &columns, None, &Given::default()).unwrap()
+    };
+    let each = [format!("t_s,{force}"), format!("t_s,{rate}")];
+    for (files, columns) in [
+        (std::slice::from_ref(&both), vec![by_name]),
+        (
+            std::slice::from_ref(&both),
+            vec![format!("t_s,{force},{rate}")],
+        ),
+        (&apart[..], each.to_vec()),
+    ] {
+        let look = look(files, &columns);
+        let units = [&look.accel, &look.gyro].map(|found| found.as_ref().and_then(|f| f.unit));
+        assert_eq!(units, [Some("g"), Some("deg/s")], "{columns:?}");
+        assert_eq!(
+            (asked(&look), look.raw_unit),
+            (String::new(), Some(RawUnit::Si))
+        );
+        assert_eq!(look.scales.len(), 2, "{columns:?}");
+    }
+    // Rows without a time show no turn, so that a person has to say the gyro's unit.
+    let open = look(&[both], &[format!("-,{force},{rate}")]);
+    let says = asked(&open);
+    assert!(
+        says.ends_with("mimu import log.txt -o DIR --units GYRO_UNIT"),
+        "{says}"
+    );
+    let magnetometer = look(&apart[..1], &["t_s,mag_x,mag_y,mag_z".to_owned()]);
+    assert_eq!(magnetometer.raw_unit, None);
+}
+
+#[test]
+fn without_names_the_triad_of_steady_magnitude_is_the_accelerometer_and_a_third_may_be_a_field() {
+    // A gyro that turns by 34 deg/s and more reads larger numbers than an accelerometer in g, or than one in coarse counts.
+    let write = |counts: f64| {
+        look("", move |i, t, f, w| {
+            let fast = if (200..400).contains(&i) { 60.0 } else { 1.0 };
+            let field = [120.0 + (i % 3) as f64, -30.0, 200.0];
+            let force = joined(f.map(|v| (v * counts / G * 1e3).round() / 1e3), 1.0, ",");
+            let rate = joined(w.map(|v| v.to_degrees() * fast * counts), 1.0, ",");
+            format!("{t:.2},{force},{rate},{}\n", joined(field, 1.0, ","))
+        })
+    };
+    let in_g = write(1.0);
+    assert_eq!(roles(&in_g), TIMED);
+    assert_eq!(in_g.accel.as_ref().and_then(|found| found.unit), Some("g"));
+    let unknown = write(2.5);
+    let says = asked(&unknown);
+    let list = TIMED.join(",") + ",mag_x,mag_y,mag_z";
+    assert!(says.contains(&format!("--columns {list} ")), "{says}");
+    assert!(
+        says.contains("the usual magnitude of specific force is 2.5"),
+        "{says}"
+    );
+}

@@ -117,5 +117,15 @@ fn readings_without_gravity_are_named_and_the_magnitude_that_is_given_is_the_med
     warns(&summary, "about 103 times the input: they are in mg");
     let summary = si([0.0, 0.0, 1.0]);
     warns(&summary, "about 0.102 times the input: they are in g");
+    for (z, said) in [
+        (
+            0.00980665,
+            "they were taken for mg, and are in g: import them in g",
+        ),
+        (0.0961704, "they were taken for mg, and are in m/s²"),
+        (9806.65, "they were taken for g, and are in mg"),
+    ] {
+        warns(&si([0.0, 0.0, z]), said);
+    }
     assert!(!warned(&si([0.1, 0.2, 9.6]), "specific force"));
 }

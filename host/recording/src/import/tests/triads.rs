@@ -127,3 +127,22 @@ fn a_sample_that_is_written_again_is_dropped_even_if_the_magnetometer_has_moved_
     let (_, batch, _) = bench.import(&bench.options(&["a"], &[])).unwrap();
     assert_eq!(batch.raw[0], [1.0, 2.0, 4.0]);
 }
+
+#[test]
+fn a_further_triad_that_is_0_in_the_whole_file_is_left_out() {
+    let row = |i: usize| {
+        let n = 1e-3 * (i % 7) as f64;
+        format!("{},{n},0.5,-0.25,{n},0,1,0,0,0,{n},0,0\n", 10 * i)
+    };
+    let bench = Bench::new(&[("a.csv", &(0..200).map(row).collect::<String>())]);
+    let list =
+        "t_s,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z,mag_x,mag_y,mag_z,mag2_x,mag2_y,mag2_z";
+    let (summary, _, _) = bench.import(&bench.options(&["a.csv"], &[list])).unwrap();
+    assert_eq!(names(&summary), "gyro accel mag2");
+    let said = summary.warnings.join("; ");
+    says(
+        &said,
+        &["a.csv: mag: it is exactly 0 on all axes", "left out"],
+    );
+    assert!(!said.contains("mag2"), "{said}");
+}
