@@ -241,15 +241,18 @@ fn several_recordings_show_what_an_instrument_errs_by_in_each() {
         };
         add(&mut together, &found.body);
         found.each.iter().for_each(|one| add(&mut alone, &one.body));
-        for (held, sensor) in found.held_out.iter().zip(Sensor::BOTH) {
-            let held = held[sensor].as_ref().unwrap();
-            // The unit errs by percents, the instrument by tenths of a percent.
-            assert!(2.0 * held.by_others.rms < held.rms_without, "{held:?}");
+        let held = found.held_out.iter().flat_map(|of| of.present());
+        let held: Vec<_> = held.collect();
+        assert_eq!(held.len(), 6);
+        for (_, held) in held {
+            // White noise is in both, so that their ratio says little: it is the sign that a person goes by.
+            assert!(held.by_others.rms < held.rms_without, "{held:?}");
         }
     }
     println!("together {together:?}, alone {alone:?}");
-    assert!(together[0] >= 0.88 * together[1], "{together:?}");
-    assert!(alone[0] < 0.8 * alone[1], "{alone:?}");
+    // Of 30 values with a share of 95 %, 25 or fewer would be inside once in 60 times if they were independent; those of a unit are not.
+    assert!(together[0] >= 0.8 * together[1], "{together:?}");
+    assert!(alone[0] < 0.7 * alone[1], "{alone:?}");
 }
 
 #[test]
