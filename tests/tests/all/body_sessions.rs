@@ -1,5 +1,6 @@
 //! One body of several sessions, each after another power-on: what it says of the next.
 
+use mimu::judgement::JudgementKind;
 use mimu_tests::body::{Found, table, tallies};
 use mimu_tests::body_sessions::lives;
 
@@ -33,7 +34,10 @@ fn a_body_of_several_sessions_is_good_and_its_intervals_hold_the_next_power_on()
 #[test]
 #[ignore = "nightly: more bodies"]
 fn intervals_of_many_bodies_of_several_sessions_hold_the_next_power_on() {
-    for sessions in [2, 3, 4] {
+    for found in shown(8, 2).iter().flatten() {
+        assert_eq!(found.judgement.kind, JudgementKind::Untested, "{found:?}");
+    }
+    for sessions in [3, 4] {
         let bodies = shown(60, sessions);
         for ((name, kind), tally) in tallies(&bodies) {
             let margin = 4.0 * (0.93 * 0.07 * 3.0 / f64::from(tally.count)).sqrt();
