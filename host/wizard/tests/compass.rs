@@ -95,9 +95,15 @@ struct Board {
 }
 
 impl Board {
-    /// In 90 poses, one after the other, as people choose them.
+    /// In 90 poses as people choose them, then in those of the verification, three times.
     fn of(file: &RigFile, seed: u64) -> Self {
-        let plan = "format = \"mimu-plan/1\"\nsample_rate_hz = 100.0\ncarrier = \"hands\"\nlatitude_deg = 48.0\nlead_in_s = 15.0\n[[step]]\nposes = 90\ndwell_s = 3.2\n";
+        let mut plan = String::from(
+            "format = \"mimu-plan/1\"\nsample_rate_hz = 100.0\ncarrier = \"hands\"\nlatitude_deg = 48.0\nlead_in_s = 15.0\n[[step]]\nposes = 90\ndwell_s = 3.2\n",
+        );
+        let then = config(9.81).verification;
+        for step in [&then[..], &then, &then].concat() {
+            plan += &format!("[[step]]\nup = {:?}\ndwell_s = 3.2\n", step.up);
+        }
         let plan = Plan::parse(Source::new("plan", plan)).expect("a plan");
         let truth = RigTruth::resolve(file, seed).expect("a rig");
         let rows = samples(&plan, &truth, seed).expect("a run");
