@@ -164,8 +164,10 @@ fn units_that_are_given_hold_for_named_columns_too() {
         (scale["value"].as_f64().unwrap() - 1.0).abs() < 1e-2,
         "{scale}"
     );
-    let error = refused(at, &format!("import bare.csv {list} -o again"));
-    says(&error, &["--units UNITS, which is count, V, or as g,deg/s"]);
+    // Without units they are found, and are those that were given.
+    done(at, &format!("import bare.csv {list} -o found"));
+    let found = json(&done(at, "fit found --json -"));
+    assert_eq!(found["sensors"], fit["sensors"]);
     let error = refused(
         at,
         &format!("import bare.csv {list} --units g,count -o again"),

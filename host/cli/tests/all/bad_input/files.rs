@@ -83,7 +83,7 @@ fn a_damaged_calibration_file_is_refused_with_its_place() {
         (good.replacen("direction = \"raw to SI\"", "direction = \"SI to raw\"", 1), &["[gyro]", "SI to raw"]),
         (good[..cut].to_string(), &["cal.toml, line", "forward", "cut"]),
         (good[..good.len() - 9].to_string(), &["cal.toml, line"]),
-        (String::new(), &["cal.toml", "missing field"]),
+        (String::new(), &["cal.toml", "the file is empty"]),
         (place.text("rec"), &["cal.toml, line 1"]),
     ];
     for (text, words) in cases {
