@@ -126,7 +126,8 @@ pub fn body(disturbance: Disturbance, bandwidth: Bandwidth, seed: u64) -> RigFil
     let mut random = Random::new(seed, "field");
     file.field = Some(FieldTruth {
         size_ut: 50.0,
-        dip_deg: random.within(75.0),
+        // The bench is in the north, where the field points down.
+        dip_deg: random.within(75.0).abs(),
         heading_deg: random.within(180.0),
         magnet: disturbance.magnet(&mut random).into_iter().collect(),
     });
