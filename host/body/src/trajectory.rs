@@ -251,7 +251,7 @@ impl ByTrajectory {
     /// The calibration of a recording's gyro and accelerometer by `trajectory`, whose times are of the recording's clock within 30 s.
     ///
     /// # Errors
-    /// The samples cannot be read; there is no gyro; the trajectory is not of this motion, or turns too little.
+    /// The samples cannot be read; the recording lacks a gyro; the trajectory is not of this motion, or turns too little.
     pub fn of(recording: &Recording, trajectory: &Trajectory) -> Result<Self> {
         Beside::read(recording, trajectory)?.fitted()
     }

@@ -245,7 +245,7 @@ fn several_recordings_show_what_an_instrument_errs_by_in_each() {
         let held: Vec<_> = held.collect();
         assert_eq!(held.len(), 6);
         for (_, held) in held {
-            // White noise is in both, so that their ratio says little: it is the sign that a person goes by.
+            // White noise is in both, so that their ratio says little: a person looks at the sign.
             assert!(held.by_others.rms < held.rms_without, "{held:?}");
         }
     }

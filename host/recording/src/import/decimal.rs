@@ -25,7 +25,7 @@ pub enum Decimal {
     Nanosecond,
 }
 
-/// Each in its order, with its symbol as it is written on the command line, its name, and how many make a second.
+/// Each in its order, with the symbol that the command line takes, its name, and how many make a second.
 const TABLE: [(Decimal, &str, &str, i64); 4] = [
     (Decimal::Second, "s", "seconds", 1),
     (Decimal::Millisecond, "ms", "milliseconds", 1_000),
